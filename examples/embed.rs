@@ -14,6 +14,7 @@ use skein_behaviors::{Percept, Setpoint};
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::Tree;
 use skein_flight::coverage::ring::division::Rule;
+use skein_flight::mount::Mount;
 use skein_geometry::frame::Pose;
 use skein_geometry::math::PI;
 use skein_peer::config::Objective;
@@ -44,6 +45,7 @@ fn airframe() -> Airframe {
         reserve_s: 60.0,
         footprint_across_m: 46.0,
         footprint_along_m: 36.0,
+        mount: Mount::Level,
     }
 }
 
@@ -152,6 +154,7 @@ impl Uav {
             traffic: Traffic::default(),
             sightings: Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
+            attitude: None,
         }
     }
 

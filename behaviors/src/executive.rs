@@ -5,7 +5,7 @@
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
 //! [`camera`], the way to a given circle from [`circle`], rounds of the loop from [`circuit`], the way along a contour that is seen from [`tracing`], turns after a moving target from [`pursuit`], a flight between cells and what it
-//! is for from [`detour`], expectations for the peer from [`prediction`], what the fuel allows
+//! is for from [`detour`], where a gimbal turns from `gaze`, expectations for the peer from [`prediction`], what the fuel allows
 //! from [`endurance`], what stays of a flight when the
 //! goal changes from `goal_change`, how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
 //! following the track and the safety of every setpoint are the reactive layer's.
@@ -34,11 +34,14 @@ pub mod camera;
 pub mod circle;
 pub mod circuit;
 mod clearance_check;
+
 pub mod detour;
 pub mod endurance;
+mod gaze;
 pub mod given;
 mod goal_change;
 pub mod new_zones;
+pub mod passes;
 pub mod prediction;
 pub mod promised;
 pub mod pursuit;
@@ -248,6 +251,8 @@ pub struct Executive {
     circuit: circuit::Circuit,
     /// What it sees of a contour.
     tracing: tracing::Tracing,
+    /// How often cells were missed.
+    passes: passes::Passes,
 }
 
 impl Executive {
@@ -285,6 +290,7 @@ impl Executive {
             stranded: false,
             circuit: circuit::Circuit::default(),
             tracing: tracing::Tracing::default(),
+            passes: passes::Passes::default(),
         }
     }
 
@@ -331,8 +337,9 @@ impl Executive {
         Envelope::new(airframe, Arc::clone(router.zones()), least_m)
     }
 
-    /// Answers a percept with a setpoint, already passed through the envelope.
-    pub fn step(
+    /// Answers a percept with a setpoint, already passed through the envelope; where its gimbal
+    /// turns is not in it yet.
+    fn steer(
         &mut self,
         percept: &Percept,
         is_open: &dyn Fn(u16) -> bool,
@@ -389,6 +396,7 @@ impl Executive {
             percept: *percept,
             steps,
             airspeed_mps: setpoint.airspeed_mps,
+            gimbal: Vec::new(),
         });
         (setpoint, events)
     }
@@ -404,6 +412,7 @@ impl Executive {
             percept: *percept,
             steps: Vec::new(),
             airspeed_mps: setpoint.airspeed_mps,
+            gimbal: Vec::new(),
         });
         setpoint
     }
@@ -415,6 +424,7 @@ impl Executive {
             height_m: self.height_m,
             steps,
             loiter: Side::Left,
+            gimbal: Vec::new(),
         }
     }
 
@@ -476,6 +486,7 @@ impl Executive {
                 self.recent.push_back(cell);
             }
         }
+        self.passes.seen += u32::try_from(seen.len()).unwrap_or(0);
         events.push(Event::Seen(seen));
     }
 
@@ -513,6 +524,7 @@ impl Executive {
                 .filter(|visit| is_open(visit.cell) && !self.recent.contains(&visit.cell));
         }
         let Some(visit) = missed else { return };
+        self.passes.miss(&visit);
         let tries = visit.tries + 1;
         if tries >= MAX_TRIES {
             events.push(Event::Refused {

@@ -8,12 +8,15 @@
 //! | [`traffic`] | what it senses of other UAVs |
 //! | [`sightings`] | what its camera sees of vehicles |
 //! | [`contour`] | what its camera sees of a road, or of the edge of a fire |
+//! | [`attitude`] | how it is tilted, and how its camera is turned in it |
+//! | [`view`] | what its camera shows, tilted or not |
 //! | [`setpoint`] | what it is told to fly |
 //! | [`order`] | what the operator wants of all and of single UAVs |
 //! | [`event`] | what the executive layer reports upwards |
 //! | [`executive`] | a plan on the coverage loop, flown leg by leg, or a flight given whole |
 //! | [`reactive`] | path following, and the envelope that has the last word |
 
+pub mod attitude;
 pub mod contour;
 pub mod event;
 pub mod executive;
@@ -25,6 +28,7 @@ pub mod sightings;
 #[cfg(test)]
 mod testing;
 pub mod traffic;
+pub mod view;
 pub mod wind_estimate;
 
 pub use event::{Event, Unflyable};

@@ -1,5 +1,6 @@
 //! What a UAV senses, from a simulator or an autopilot.
 
+use crate::attitude::Attitude;
 use crate::contour::ContourLook;
 use crate::sightings::Sightings;
 use crate::traffic::Traffic;
@@ -41,4 +42,7 @@ pub struct Percept {
     /// What its camera sees of a contour.
     #[serde(default, skip_serializing_if = "ContourLook::is_absent")]
     pub contour: ContourLook,
+    /// How it is tilted, where its camera is not held level by something else.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attitude: Option<Attitude>,
 }

@@ -27,6 +27,29 @@ pub struct Steer {
 /// correction fit into the horizon with room to spare.
 pub const MAX_STEPS: usize = 8;
 
+/// Where a gimbal is to be turned in the airframe.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GimbalStep {
+    /// Within so long from the step before, evenly, milliseconds.
+    pub duration_ms: u32,
+    /// About the length of the airframe, as the bank, radians.
+    pub roll_rad: f64,
+    /// About its inner axis, the picture forwards, radians.
+    pub pitch_rad: f64,
+}
+
+impl GimbalStep {
+    /// Whether both angles are numbers.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.roll_rad.is_finite() && self.pitch_rad.is_finite()
+    }
+}
+
+/// The most steps of a gimbal: until the airframe's failsafe acts, and half a second to spare,
+/// in tenths of a second.
+pub const MAX_GIMBAL_STEPS: usize = 16;
+
 /// A command to the airframe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setpoint {
@@ -40,4 +63,7 @@ pub struct Setpoint {
     pub steps: Vec<Steer>,
     /// On which side the failsafe loiter is clear of the zones.
     pub loiter: Side,
+    /// How a gimbal is turned from `from_ms` on; after the last one it stays. Empty without one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gimbal: Vec<GimbalStep>,
 }

@@ -6,6 +6,7 @@ use crate::setpoint::{Setpoint, Side};
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::lanes;
 use skein_flight::coverage::ring::{CoverageLoop, LoopProblem};
+use skein_flight::mount::Mount;
 use skein_flight::route::{RouteLimits, Router};
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::PI;
@@ -28,6 +29,7 @@ pub fn airframe() -> Airframe {
         reserve_s: 120.0,
         footprint_across_m: 46.0,
         footprint_along_m: 36.0,
+        mount: Mount::Level,
     }
 }
 
@@ -46,6 +48,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         traffic: crate::traffic::Traffic::default(),
         sightings: crate::sightings::Sightings::default(),
         contour: crate::contour::ContourLook::default(),
+        attitude: None,
     }
 }
 

@@ -5,7 +5,9 @@
 //! half sides ([`Airframe`]).
 
 use crate::json::{Error, Fields, Node};
+use crate::mount;
 use skein_flight::airframe::Airframe;
+use skein_flight::mount::Mount;
 use skein_flight::trajectory::timed::Objective;
 use skein_geometry::math::tan;
 
@@ -36,6 +38,9 @@ const FIELDS: &[&str] = &[
     "camera",
     "footprint",
 ];
+
+/// The fields of a camera: angles of view, and how it is held.
+const CAMERA: &[&str] = &["fov_across_deg", "fov_along_deg", "mount"];
 
 /// Reads an airframe. Its camera is stated by its footprint, or by its angles where the
 /// height is known from which it looks.
@@ -74,6 +79,8 @@ pub fn read(node: &Node<'_>, level_m: Option<f64>) -> Result<Airframe, Error> {
         )));
     }
     let (across_m, along_m) = footprint(&f, level_m)?;
+    let camera = f.get("camera").map(|c| c.fields(CAMERA)).transpose()?;
+    let mount = camera.as_ref().and_then(|c| c.get("mount"));
     Ok(Airframe {
         stall_mps,
         cruise_mps,
@@ -86,13 +93,20 @@ pub fn read(node: &Node<'_>, level_m: Option<f64>) -> Result<Airframe, Error> {
         reserve_s,
         footprint_across_m: across_m,
         footprint_along_m: along_m,
+        mount: mount.map_or(Ok(Mount::Level), mount::read)?,
     })
 }
 
 /// Half the footprint, across and along the track.
 fn footprint(f: &Fields<'_>, level_m: Option<f64>) -> Result<(f64, f64), Error> {
     let example = "{ across_m: 60, along_m: 50 }";
-    if let Some(camera) = f.get("camera") {
+    let views = |camera: &&Node<'_>| -> Result<bool, Error> {
+        let g = camera.fields(CAMERA)?;
+        Ok(CAMERA[..2].iter().any(|name| g.get(name).is_some()))
+    };
+    if let Some(camera) = f.get("camera")
+        && views(&camera)?
+    {
         if let Some(node) = f.get("footprint") {
             return Err(node.wrong("give either the camera or its footprint, not both"));
         }
@@ -123,7 +137,7 @@ fn footprint(f: &Fields<'_>, level_m: Option<f64>) -> Result<(f64, f64), Error> 
 
 /// Half the footprint of a camera that looks down from a height.
 fn seen_from(level_m: f64, camera: &Node<'_>) -> Result<(f64, f64), Error> {
-    let g = camera.fields(&["fov_across_deg", "fov_along_deg"])?;
+    let g = camera.fields(CAMERA)?;
     let half = |name| -> Result<f64, Error> {
         let at = g.need(name, "90")?;
         let (low_deg, high_deg) = FIELD_OF_VIEW_DEG;
@@ -144,7 +158,7 @@ fn seen_from(level_m: f64, camera: &Node<'_>) -> Result<(f64, f64), Error> {
 /// The airframe as [`read`] takes it; what is read back is the same to the last bit.
 #[must_use]
 pub fn to_json(a: &Airframe) -> serde_json::Value {
-    serde_json::json!({
+    let mut json = serde_json::json!({
         "stall_mps": a.stall_mps,
         "cruise_mps": a.cruise_mps,
         "max_mps": a.max_mps,
@@ -155,12 +169,16 @@ pub fn to_json(a: &Airframe) -> serde_json::Value {
             "across_m": 2.0 * a.footprint_across_m,
             "along_m": 2.0 * a.footprint_along_m,
         },
-    })
+    });
+    if !a.mount.is_level() {
+        json["camera"] = serde_json::json!({ "mount": mount::to_json(&a.mount) });
+    }
+    json
 }
 
 /// The degrees that become exactly these radians again, where there are any: whoever
 /// wrote 80 gets 80 back, and not the next number above it.
-fn degrees(rad: f64) -> f64 {
+pub(crate) fn degrees(rad: f64) -> f64 {
     let deg = rad.to_degrees();
     let rounded = format!("{deg:.9}").parse().unwrap_or(deg);
     let same = |d: f64| d.to_radians().to_bits() == rad.to_bits();
@@ -186,6 +204,7 @@ pub fn objective(node: &Node<'_>) -> Result<Objective, Error> {
 mod tests {
     use super::*;
     use crate::json::Document;
+    use skein_flight::mount::Gimbal;
 
     fn parse(text: &str, level_m: Option<f64>) -> Result<Airframe, Error> {
         read(&Document::parse("airframe", "a", text)?.root(), level_m)
@@ -229,6 +248,39 @@ mod tests {
             (Some(5001.0), "camera.fov_across_deg: 90° see 10002.0 m"),
         ] {
             let said = from(level_m).unwrap_err();
+            assert!(said.contains(want), "{said}");
+        }
+        for (mount, want) in [
+            ("\"level\"", Mount::Level),
+            ("\"fixed\"", Mount::Fixed),
+            (
+                "{ gimbal: { roll_deg: 55, pitch_deg: 40.1, rate_dps: 120 } }",
+                Mount::Gimbal(Gimbal {
+                    roll_rad: 55.0_f64.to_radians(),
+                    pitch_rad: 40.1_f64.to_radians(),
+                    rate_radps: 120.0_f64.to_radians(),
+                }),
+            ),
+        ] {
+            let held = text.replace("60 }", &format!("60, mount: {mount} }}"));
+            let a = parse(&held, Some(45.0)).unwrap();
+            assert_eq!(a.mount, want);
+            // A peer's own file states the footprint beside the mount.
+            assert_eq!(parse(&to_json(&a).to_string(), None).unwrap(), a);
+        }
+        for (mount, want) in [
+            ("\"fixd\"", "camera.mount"),
+            (
+                "{ gimbal: { roll_deg: 95, pitch_deg: 4, rate_dps: 9 } }",
+                "roll_deg: 95",
+            ),
+            (
+                "{ gimbal: { roll_deg: 5, rate_dps: 9 } }",
+                "pitch_deg is missing",
+            ),
+        ] {
+            let held = text.replace("60 }", &format!("60, mount: {mount} }}"));
+            let said = parse(&held, Some(45.0)).unwrap_err().to_string();
             assert!(said.contains(want), "{said}");
         }
         let nothing = "{ stall_mps: 9, cruise_mps: 14, max_mps: 18, endurance_s: 900 }";

@@ -15,6 +15,7 @@
 //! | [`geojson`] | areas, and buildings with heights |
 //! | [`targets`] | points and lines to look at, of both formats |
 //! | [`airframe`] | airframes of scenarios and of peers, with their limits |
+//! | [`mount`] | how cameras are held |
 //! | [`fleet`] | fleet files of plans for a team |
 //! | [`height`] | heights as map data writes them: `12.13 m`, `3.5`, `40 ft` |
 //!
@@ -34,6 +35,7 @@ pub mod height;
 pub mod json;
 pub mod landing;
 pub mod mission;
+pub mod mount;
 pub mod place;
 pub mod plan;
 pub mod targets;

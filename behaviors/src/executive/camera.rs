@@ -2,14 +2,17 @@
 //!
 //! A cell is reported only for a pose that the UAV was truly at: the poses of
 //! percepts, and poses between two percepts where the commanded turns, played from
-//! the first, end at the second. Anything else stays unseen and is flown again.
+//! the first, end at the second. Anything else stays unseen and is flown again. A picture that
+//! tilts is looked at between two percepts only while its angles hardly change.
 
 use crate::percept::Percept;
 use crate::reactive::follow::fly;
-use crate::setpoint::Steer;
+use crate::setpoint::{GimbalStep, Steer};
+use crate::view::View;
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CoverageLoop;
-use skein_flight::coverage::ring::patch::{Corners, frame_holds};
+use skein_flight::coverage::ring::patch::Corners;
+use skein_flight::mount::DIRECTION_OFF_RAD;
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::wrap_pi;
 
@@ -28,6 +31,10 @@ const FILLED_MS: u64 = 1000;
 const MET_M: f64 = 0.3;
 const MET_RAD: f64 = 0.01;
 
+/// Between two percepts a picture that tilts is looked at while its angles vary by no more than
+/// this, radians: 2 m on the ground from 100 m.
+const STEADY_RAD: f64 = 0.02;
+
 /// Distance between the poses that are looked at, metres: a third of the stretch of a
 /// quarter turn from which a cell just fits the frame.
 const BETWEEN_POSES_M: f64 = 1.0;
@@ -41,6 +48,8 @@ pub struct Played {
     pub steps: Vec<Steer>,
     /// The airspeed from then on, m/s.
     pub airspeed_mps: f64,
+    /// How the gimbal is turned from then on.
+    pub gimbal: Vec<GimbalStep>,
 }
 
 /// Patches of the ground by number, and which lie near a camera.
@@ -77,12 +86,9 @@ pub fn look<G: Ground + ?Sized>(
     is_open: &dyn Fn(u16) -> bool,
     seen: &mut Vec<u16>,
 ) {
-    let lens = Lens {
-        ground,
-        airframe,
-        is_open,
-    };
-    lens.look(&now.pose, POSE_ERROR_M, seen);
+    let view = View::of(now, airframe);
+    let lens = Lens { ground, is_open };
+    lens.look(&view, (POSE_ERROR_M, DIRECTION_OFF_RAD), seen);
     let Some(before) = before else { return };
     let Some(ms) = now
         .time_ms
@@ -115,6 +121,15 @@ pub fn look<G: Ground + ?Sized>(
     }
     let reach_m = airframe.footprint_across_m + airframe.footprint_along_m;
     let slack_m = POSE_ERROR_M + BETWEEN_M + off_m + off_rad * reach_m;
+    let varied_rad = if airframe.mount.is_level() {
+        0.0
+    } else {
+        before.varied_rad(now, ms)
+    };
+    if varied_rad > STEADY_RAD {
+        return;
+    }
+    let slack = (slack_m, DIRECTION_OFF_RAD + varied_rad);
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -125,26 +140,63 @@ pub fn look<G: Ground + ?Sized>(
         .clamp(1.0, 64.0) as u32;
     for i in 1..parts {
         let pose = flown(ms * i / parts);
-        lens.look(&pose, slack_m, seen);
+        lens.look(&view.moved(pose, now.attitude), slack, seen);
+    }
+}
+
+impl Played {
+    /// By how much any angle of the camera may have differed since then from those at the next
+    /// percept, `ms` later, radians. Wings and gimbal move towards what was commanded, so they
+    /// stay between that and where they are at both ends.
+    fn varied_rad(&self, now: &Percept, ms: u32) -> f64 {
+        let (Some(was), Some(is)) = (self.percept.attitude, now.attitude) else {
+            return f64::INFINITY;
+        };
+        let (mut banks, mut at_ms) = (vec![was.bank_rad], 0);
+        for step in &self.steps {
+            if at_ms >= ms {
+                break;
+            }
+            banks.push(Airframe::bank_rad(self.airspeed_mps, step.turn_rate_radps));
+            at_ms = at_ms.saturating_add(step.duration_ms);
+        }
+        let spread = |angles: &mut dyn Iterator<Item = f64>, is: f64| {
+            angles.map(|a| (a - is).abs()).fold(0.0, f64::max)
+        };
+        let bank_rad = spread(&mut banks.into_iter(), is.bank_rad);
+        let pitch_rad = (was.pitch_rad - is.pitch_rad).abs();
+        let mut until_ms = 0;
+        let mut begun = self.gimbal.iter().filter(|step| {
+            let begins = until_ms < ms;
+            until_ms = until_ms.saturating_add(step.duration_ms);
+            begins
+        });
+        let (mut roll_rad, mut lift_rad) = (
+            (was.gimbal_roll_rad - is.gimbal_roll_rad).abs(),
+            (was.gimbal_pitch_rad - is.gimbal_pitch_rad).abs(),
+        );
+        for step in begun.by_ref() {
+            roll_rad = f64::max(roll_rad, (step.roll_rad - is.gimbal_roll_rad).abs());
+            lift_rad = f64::max(lift_rad, (step.pitch_rad - is.gimbal_pitch_rad).abs());
+        }
+        bank_rad + pitch_rad + roll_rad + lift_rad
     }
 }
 
 struct Lens<'a, G: ?Sized> {
     ground: &'a G,
-    airframe: &'a Airframe,
     is_open: &'a dyn Fn(u16) -> bool,
 }
 
 impl<G: Ground + ?Sized> Lens<'_, G> {
-    /// Cells that the footprint at `pose` contains, its sides shortened by `slack_m`.
-    fn look(&self, pose: &Pose, slack_m: f64, seen: &mut Vec<u16>) {
-        let across_m = self.airframe.footprint_across_m - slack_m;
-        let along_m = self.airframe.footprint_along_m - slack_m;
-        let p = pose.position();
+    /// Patches that a picture contains, though places and angles are off by so much.
+    fn look(&self, view: &View, (slack_m, slack_rad): (f64, f64), seen: &mut Vec<u16>) {
+        let (across_m, along_m) = view.reach_m(slack_m);
+        let p = view.from();
         let mut contained = |cell: u16, corners: &Corners| {
             if (self.is_open)(cell)
                 && !seen.contains(&cell)
-                && frame_holds(corners, *pose, across_m, along_m)
+                && view.holds(corners, slack_m, slack_rad)
             {
                 seen.push(cell);
             }

@@ -168,6 +168,7 @@ impl Executive {
             percept: *percept,
             steps: setpoint.steps.clone(),
             airspeed_mps: setpoint.airspeed_mps,
+            gimbal: Vec::new(),
         });
         (setpoint, events)
     }
@@ -275,6 +276,7 @@ impl Executive {
             let visit = front.kind.visit();
             let missed = visit.filter(|v| is_open(v.cell) && !self.recent.contains(&v.cell));
             let Some(visit) = missed else { continue };
+            self.passes.miss(&visit);
             let tries = visit.tries + 1;
             if tries >= super::MAX_TRIES {
                 let cells = vec![visit.cell];

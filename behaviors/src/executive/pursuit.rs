@@ -150,6 +150,7 @@ impl Executive {
             percept: *percept,
             steps: setpoint.steps.clone(),
             airspeed_mps: setpoint.airspeed_mps,
+            gimbal: Vec::new(),
         });
         Some(setpoint)
     }

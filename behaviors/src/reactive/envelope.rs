@@ -377,6 +377,7 @@ mod tests {
             height_m: 90.0,
             steps,
             loiter: Side::Left,
+            gimbal: Vec::new(),
         }
     }
 

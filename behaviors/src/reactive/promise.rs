@@ -49,5 +49,6 @@ pub fn fly(motion: &Motion, percept: &Percept, airframe: &Airframe, height_m: f6
         height_m,
         steps: track.steps(offset, airspeed_mps, limit_radps),
         loiter: Side::Right,
+        gimbal: Vec::new(),
     }
 }

@@ -52,6 +52,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/fire.json5"),
     ),
     (
+        "gimbal",
+        "gimbal.json5",
+        include_str!("../../../configs/trials/gimbal.json5"),
+    ),
+    (
         "gusts",
         "gusts.json5",
         include_str!("../../../configs/trials/gusts.json5"),

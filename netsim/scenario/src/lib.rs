@@ -12,6 +12,7 @@
 //! | `request` | what a command line may ask for |
 //! | `read` | the values that the text states, with their places |
 //! | `flight_model` | how its UAVs fly in its wind |
+//! | `mounts` | what cameras that tilt ask of it |
 //! | `mission` | the mission: metres become millimetres |
 //! | `choose_tree` | the spanning tree of the lanes, where it is left open |
 //! | `feasibility` | what cannot succeed, or may disappoint |
@@ -42,6 +43,7 @@ mod files;
 mod flight_model;
 mod forecast;
 mod mission;
+mod mounts;
 #[cfg(test)]
 mod operated;
 mod read;

@@ -2,7 +2,8 @@
 //! millimetres here. Leaves the loop to the mission itself, and whether it can succeed to
 //! `feasibility`.
 
-use crate::flight_model::{footprint_m, turn_radius_m};
+use crate::flight_model::turn_radius_m;
+use crate::mounts::{check_mounts, held_footprint_m};
 use crate::read::Stated;
 use crate::read::targets::Asked;
 use crate::request::AreaPlanner;
@@ -47,7 +48,9 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
     let first = s.fleet.members.first().and_then(|m| m.launch);
     let launch = first.map_or(base, |l| l.position());
     let seen = |side: fn((f64, f64)) -> f64| {
-        let each = airframes().map(|a| side(footprint_m(a, s.wind.strongest_held(), turn_m)));
+        let wind = s.wind.strongest_held();
+        let members = s.fleet.members.iter();
+        let each = members.map(|m| side(held_footprint_m(&m.airframe, wind, turn_m, m.height_m)));
         each.fold(f64::MAX, f64::min)
     };
     let mission = Mission {
@@ -90,6 +93,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
             0
         },
     };
+    check_mounts(s)?;
     check_separation(s, &mission)?;
     check_diagram(s, &mission)?;
     check_brought(s, &mission)?;

@@ -185,12 +185,17 @@ pub fn setpoint_hash(s: &Setpoint) -> u64 {
         reason = "casts from floats saturate, and only bits count"
     )]
     let q = |v: f64| (v * 1e6).round() as i64 as u64;
-    s.steps
+    let turns = s
+        .steps
         .iter()
         .fold(s.from_ms ^ q(s.airspeed_mps).rotate_left(32), |h, step| {
             (h ^ q(step.turn_rate_radps) ^ (u64::from(step.duration_ms) << 40))
                 .wrapping_mul(0x9E37_79B9_7F4A_7C15)
-        })
+        });
+    s.gimbal.iter().fold(turns, |h, step| {
+        (h ^ q(step.roll_rad) ^ q(step.pitch_rad).rotate_left(24))
+            .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+    })
 }
 
 /// The content of a report as one number.

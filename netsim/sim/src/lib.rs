@@ -51,5 +51,6 @@ pub use check::Findings;
 pub use check::contours::{ContourCheck, ContourReport};
 pub use check::counts::CountReport;
 pub use check::detections::{DetectionCheck, DetectionReport, Truth};
+pub use check::footprint::FootprintErrors;
 pub use geometry_cache::geometry_of;
 pub use prepared::Prepared;

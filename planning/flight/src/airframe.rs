@@ -1,10 +1,14 @@
 //! What a UAV can fly: airspeeds, bank, endurance (D2.7 §1.1, §2.2).
 
+use crate::mount::Mount;
 use serde::{Deserialize, Serialize};
-use skein_geometry::math::{acos, cos, tan};
+use skein_geometry::math::{acos, atan2, cos, tan};
 
 /// Standard gravity, m/s².
 pub const GRAVITY_MPS2: f64 = 9.806_65;
+
+/// How fast the wings roll into a turn and out of it, rad/s: 60° a second.
+pub const ROLL_RATE_RADPS: f64 = core::f64::consts::FRAC_PI_3;
 
 /// Share of the ground speed that turns may need in a wind: following them takes the rest.
 const TURN_AUTHORITY: f64 = 0.97;
@@ -32,6 +36,9 @@ pub struct Airframe {
     pub footprint_across_m: f64,
     /// Half the camera footprint along the track at the flight level, metres.
     pub footprint_along_m: f64,
+    /// How the camera is held: both halves are those of a picture from straight above.
+    #[serde(default, skip_serializing_if = "Mount::is_level")]
+    pub mount: Mount,
 }
 
 impl Airframe {
@@ -70,6 +77,12 @@ impl Airframe {
     pub fn airspeed_for_turns_mps(&self, radius_m: f64, wind_mps: f64) -> f64 {
         let most = (radius_m * GRAVITY_MPS2 * tan(self.max_bank_rad)).sqrt();
         self.cruise_mps.min(TURN_AUTHORITY * most - wind_mps)
+    }
+
+    /// The bank of a coordinated turn, radians, positive to the left: tan φ = V ω / g.
+    #[must_use]
+    pub fn bank_rad(airspeed_mps: f64, turn_rate_radps: f64) -> f64 {
+        atan2(airspeed_mps * turn_rate_radps, GRAVITY_MPS2)
     }
 
     /// The fastest turn at `airspeed_mps`, rad/s.
@@ -163,6 +176,7 @@ mod tests {
             reserve_s: 120.0,
             footprint_across_m: 20.0,
             footprint_along_m: 15.0,
+            mount: Mount::Level,
         };
         let p = PowerModel::of(&a);
         assert!((p.share(13.0, 0.0) - 1.0).abs() < 1e-12);

@@ -6,6 +6,7 @@
 //! | module | what it holds | D2.7 |
 //! |---|---|---|
 //! | [`airframe`] | what a UAV can fly | 2.2 |
+//! | [`mount`] | how its camera is held | 1.2.1 |
 //! | [`route`] | the shortest route with clearance | 2.3.2 |
 //! | [`trajectory`] | Dubins words, flights in wind, timed trajectories | 2.4 |
 //! | [`separation`] | promised motions, whether two keep apart, ways round | 1.3 |
@@ -62,6 +63,7 @@
 
 pub mod airframe;
 pub mod coverage;
+pub mod mount;
 pub mod route;
 pub mod separation;
 pub mod tracing;

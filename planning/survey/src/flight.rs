@@ -4,6 +4,7 @@
 use crate::flown;
 use crate::team::Uav;
 use skein_flight::airframe::{Airframe, GRAVITY_MPS2, PowerModel};
+use skein_flight::mount::Mount;
 use skein_geometry::Curve;
 use skein_geometry::frame::Point;
 use skein_geometry::math::{PI, atan2};
@@ -77,6 +78,7 @@ impl Flight {
             reserve_s: 0.0,
             footprint_across_m: 0.0,
             footprint_along_m: 0.0,
+            mount: Mount::Level,
         });
         let turned_rad: f64 = self
             .track

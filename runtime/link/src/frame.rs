@@ -9,7 +9,7 @@ use crate::{LinkNews, RadioCounters};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use skein_behaviors::Percept;
 use skein_behaviors::Setpoint;
-use skein_behaviors::setpoint::MAX_STEPS;
+use skein_behaviors::setpoint::{GimbalStep, MAX_GIMBAL_STEPS, MAX_STEPS};
 
 /// The longest frame, bytes: a row of 1,000 links takes about 90 kB with field
 /// names, a report that lists 65,535 cells 200 kB.
@@ -142,7 +142,8 @@ fn check_percept(p: &Percept) -> Result<(), FrameError> {
         p.wind_north_mps,
         p.endurance_s,
     ];
-    if values.iter().all(|v| v.is_finite()) {
+    let turned = p.attitude.is_none_or(|a| a.is_finite());
+    if turned && values.iter().all(|v| v.is_finite()) {
         Ok(())
     } else {
         Err(FrameError::OutOfBounds("percept"))
@@ -152,12 +153,16 @@ fn check_percept(p: &Percept) -> Result<(), FrameError> {
 fn check_setpoint(s: &Setpoint) -> Result<(), FrameError> {
     let finite = s.airspeed_mps.is_finite()
         && s.height_m.is_finite()
-        && s.steps.iter().all(|step| step.turn_rate_radps.is_finite());
+        && s.steps.iter().all(|step| step.turn_rate_radps.is_finite())
+        && s.gimbal.iter().all(GimbalStep::is_finite);
     if !finite {
         return Err(FrameError::OutOfBounds("setpoint"));
     }
     if s.steps.len() > MAX_STEPS {
         return Err(FrameError::OutOfBounds("steps of the setpoint"));
+    }
+    if s.gimbal.len() > MAX_GIMBAL_STEPS {
+        return Err(FrameError::OutOfBounds("steps of the gimbal"));
     }
     Ok(())
 }
@@ -252,6 +257,7 @@ mod tests {
                 steps
             ],
             loiter: Side::Left,
+            gimbal: Vec::new(),
         })
     }
 

@@ -28,6 +28,7 @@ use crate::wire::codec::Body;
 use crate::wire::count::Count;
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Percept;
+use skein_behaviors::view::View;
 use skein_flight::airframe::Airframe;
 use skein_flight::tracking::tracks::{TargetName, Track, Tracks};
 use skein_geometry::Polygon;
@@ -367,7 +368,8 @@ impl Counting {
         let mut watched = 0_u16;
         for (i, site) in self.sites.iter_mut().enumerate() {
             let corners = site.outline.vertices();
-            let is_pictured = || is_in_picture(percept.pose, airframe, corners);
+            let view = View::of(percept, airframe);
+            let is_pictured = || corners.iter().all(|p| view.shows(*p, INNER));
             let is_watched = counts && !site.is_left_to_another && is_pictured();
             let was = site.since_ms.filter(|_| apart_ms > 0);
             if is_watched && was.is_some() {
@@ -480,7 +482,7 @@ impl Counting {
 
     /// Where others of lower numbers were, and how long ago they said so, milliseconds: what one
     /// of them has in its picture, if it flew straight on since, that one counts. They are taken to
-    /// have the own airframe.
+    /// have the own airframe, and to fly level.
     pub fn heed(&mut self, others: &[(Pose, u64)], interval_ms: u64, airframe: &Airframe) {
         let fresh = others
             .iter()

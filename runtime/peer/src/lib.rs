@@ -104,6 +104,7 @@ pub mod diagram;
 mod diary;
 mod effect;
 pub mod errand;
+pub mod footprint;
 mod fuel;
 mod inbound;
 pub mod input;

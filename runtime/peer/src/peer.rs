@@ -16,6 +16,7 @@ use crate::config::{PeerConfig, Role};
 use crate::cooperation::{Cooperation, Situation};
 use crate::diary::Diary;
 use crate::effect::{Effect, Effects, PendingJob, Promise};
+use crate::footprint::Footprint;
 use crate::inbound::{self, Heard};
 use crate::input::{AskedTask, TaskEdit};
 use crate::input::{Command, Input, Time};
@@ -975,6 +976,13 @@ impl Peer {
         self.cooperation
             .fill(&mut beliefs, counter, self.percept.as_ref());
         beliefs
+    }
+
+    /// What it plans to have in its picture; none of who flies nothing.
+    #[must_use]
+    pub fn footprint(&self) -> Option<Footprint> {
+        let executive = self.cooperation.state()?.executive.as_ref()?;
+        Some(Footprint::of(executive))
     }
 
     /// What this UAV counted itself at each site of its mission, and whether it does so by its last

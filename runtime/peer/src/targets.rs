@@ -27,13 +27,14 @@ use crate::wire::target::{SPREAD_MAX_E3, TARGETS_MAX, Target};
 use crate::wire::tasks::TaskId;
 use search::{Search, WAYS_MAX};
 use skein_behaviors::Percept;
+use skein_behaviors::view::View;
 use skein_flight::airframe::Airframe;
 use skein_flight::tracking::estimate::{Detection, Estimate};
 use skein_flight::tracking::follower::TargetMotion;
 use skein_flight::tracking::fusion::{Board, Fused, Register};
 use skein_flight::tracking::told::Spread;
 use skein_flight::tracking::tracks::{Kind, Sighting, TargetName, Tracks};
-use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::frame::{Point, Vector};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Density of the acceleration of targets, m²/s³: a car that brakes or turns off at 2.5 m/s²
@@ -175,7 +176,8 @@ impl Targets {
         };
         self.now_ms = percept.time_ms;
         let look: Vec<Sighting> = percept.sightings.seen().map(sighting).collect();
-        let in_view = |p: Point| is_in_view(percept.pose, &airframe, p);
+        let view = View::of(percept, &airframe);
+        let in_view = |p: Point| view.shows(p, INNER);
         self.tracks.look(self.now_ms, &look, &in_view);
         self.count_hits();
         let own: Vec<Register> = self.own().collect();
@@ -466,13 +468,6 @@ impl Followed {
     pub fn is_lost(&self) -> bool {
         self.unseen_s > SEARCH_S
     }
-}
-
-/// Whether a place is in what counts of the picture of a camera.
-fn is_in_view(pose: Pose, airframe: &Airframe, p: Point) -> bool {
-    let (forward, to) = (pose.direction(), p - pose.position());
-    let along = forward.dot(&to).abs() <= INNER * airframe.footprint_along_m;
-    along && forward.perp(&to).abs() <= INNER * airframe.footprint_across_m
 }
 
 /// A target that stands.

@@ -21,6 +21,7 @@ use skein_behaviors::{Order, Percept, Setpoint, Steer};
 use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::Tree;
 use skein_flight::coverage::ring::division::Rule;
+use skein_flight::mount::Mount;
 use skein_flight::trajectory::timed::Objective;
 use skein_geometry::frame::Pose;
 use skein_geometry::math::PI;
@@ -88,6 +89,7 @@ pub fn airframe() -> Airframe {
         reserve_s: 60.0,
         footprint_across_m: 46.0,
         footprint_along_m: 36.0,
+        mount: Mount::Level,
     }
 }
 
@@ -174,6 +176,7 @@ impl Seat {
             traffic: skein_behaviors::traffic::Traffic::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
+            attitude: None,
         }
     }
 

@@ -9,6 +9,7 @@ use super::tasks::TaskReport;
 use crate::check::contours::ContourReport;
 use crate::check::counts::CountReport;
 use crate::check::detections::DetectionReport;
+use crate::check::footprint::FootprintErrors;
 use crate::check::wind::WindErrors;
 use crate::check::{Findings, Violation};
 use crate::world::Judge;
@@ -145,6 +146,9 @@ pub struct Simulated {
     /// How wrong the winds were by which UAVs flew, where they estimate it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wind_errors: Option<WindErrors>,
+    /// How far pictures were from where they were planned, where cameras may tilt.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub footprint_errors: Option<FootprintErrors>,
 }
 
 /// What only a live trial can tell.

@@ -166,6 +166,13 @@ impl RunReport {
                 wind.rms_mps, wind.max_mps
             )?;
         }
+        if let Some(e) = self.simulated.as_ref().and_then(|s| s.footprint_errors) {
+            writeln!(
+                f,
+                "  footprint  {:.1} m from where it is planned on the mean, {:.1} m in 99 of 100 looks; {} cells seen, {} missed at first",
+                e.mean_m, e.p99_m, e.seen, e.missed
+            )?;
+        }
         if let Some(simulated) = &self.simulated {
             for d in &simulated.false_downs {
                 writeln!(

@@ -4,6 +4,7 @@
 use super::contours::Tracer;
 use super::cover::CoverCheck;
 use super::detections::{Around, Truth};
+use super::footprint::FootprintErrors;
 use super::graph::{Graph, Stability};
 use super::listing::ListingCheck;
 use super::membership::Membership;
@@ -111,6 +112,12 @@ impl Checker {
             loop_hash: 0,
             roster: Some(spec.launches()).filter(|l| l.len() > MEMBERS_MAX),
         }
+    }
+
+    /// How far pictures were from where they were planned so far.
+    #[must_use]
+    pub fn footprint_errors(&self) -> FootprintErrors {
+        self.rules.footprint.errors()
     }
 
     /// A loop was derived.

@@ -11,10 +11,10 @@
 
 use super::Findings;
 use crate::account::secs;
-use crate::world::detector::frames;
+use crate::world::camera::Picture;
 use serde::{Deserialize, Serialize};
 use skein_geometry::Polygon;
-use skein_geometry::frame::{Point, Pose};
+use skein_geometry::frame::Point;
 use skein_peer::Mission;
 use skein_peer::count_site::{CountSite, Counted};
 use skein_peer::counting::SiteCount;
@@ -264,12 +264,10 @@ struct Watcher {
 pub struct CountLook<'a> {
     /// Whose.
     pub uav: u16,
-    /// Where it is.
-    pub pose: Pose,
+    /// What it sees.
+    pub picture: Picture,
     /// Whether its computer is late: what it says is of where it was.
     pub is_late: bool,
-    /// Half of what it sees there across and along, metres.
-    pub half_m: (f64, f64),
     /// Site by site whether it says that it counts, and what it counted.
     pub counted: &'a [(bool, Count)],
 }
@@ -547,10 +545,8 @@ impl CountCheck {
 impl Site {
     /// Whether all of it is in so much of a picture, each way.
     fn is_pictured(&self, look: CountLook<'_>, share: f64) -> bool {
-        let (across_m, along_m) = look.half_m;
-        let half_m = (share * across_m, share * along_m);
         let mut corners = self.outline.vertices().iter();
-        corners.all(|p| frames(look.pose, *p, half_m))
+        corners.all(|p| look.picture.shows(*p, share))
     }
 }
 

@@ -50,6 +50,7 @@ pub mod decision;
 pub mod detections;
 pub mod findings;
 pub mod flight;
+pub mod footprint;
 pub mod fuel;
 pub mod graph;
 pub mod handicaps;

@@ -8,6 +8,7 @@ use super::counts::CountCheck;
 use super::decision::{DecisionCheck, Mover};
 use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
+use super::footprint::FootprintCheck;
 use super::fuel::FuelCheck;
 use super::listing::ListingCheck;
 use super::patience::PatienceCheck;
@@ -61,6 +62,7 @@ pub struct Rules {
     pub tracks: TrackCheck,
     watch: WatchCheck,
     pub(crate) wind: WindCheck,
+    pub(crate) footprint: FootprintCheck,
     /// What the mission looks for.
     pub detections: DetectionCheck,
     /// Contours that are flown along.
@@ -100,6 +102,7 @@ impl Rules {
             tracks: TrackCheck::default(),
             watch: WatchCheck::default(),
             wind: WindCheck::new(&spec.wind),
+            footprint: FootprintCheck::default(),
             detections: DetectionCheck::default(),
             contours: ContourCheck::default(),
             counts: CountCheck::default(),

@@ -36,6 +36,7 @@ pub(super) fn decide(flyers: &mut [Flyer], range_m: f64, now_ms: u64) {
             height_m: 0.0,
             steps: vec![steer],
             loiter: Side::Right,
+            gimbal: Vec::new(),
         };
         let _ = f.body.apply(setpoint, now_ms);
     }

@@ -2,6 +2,7 @@
 
 use super::{all_apart, beside};
 use skein_flight::airframe::Airframe;
+use skein_flight::mount::Mount;
 use skein_flight::separation::motion::{heading_e7, to_mm, to_signed_mm};
 use skein_flight::separation::{Detours, End, Motion, MotionPlan, Stretch};
 use skein_geometry::frame::{Point, Pose};
@@ -104,6 +105,7 @@ fn airframe(cruise_mps: f64) -> Airframe {
         reserve_s: 300.0,
         footprint_across_m: 40.0,
         footprint_along_m: 30.0,
+        mount: Mount::Level,
     }
 }
 

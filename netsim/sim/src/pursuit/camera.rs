@@ -17,6 +17,13 @@ const STALL_RAD: f64 = 0.21;
 /// The wing is set to the fuselage at this angle, radians.
 const INCIDENCE_RAD: f64 = 0.06;
 
+/// How far the nose is up in level flight, from what the wing carries at a bank, radians.
+#[must_use]
+pub fn pitch_rad(airframe: &Airframe, airspeed_mps: f64, bank_rad: f64) -> f64 {
+    let share = airframe.stall_mps / airspeed_mps.max(1.0);
+    STALL_RAD * share * share / cos(bank_rad) - INCIDENCE_RAD
+}
+
 /// How a camera is held.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Mount {
@@ -77,8 +84,7 @@ impl Attitude {
         turn_rate_radps: f64,
     ) -> Self {
         let bank_rad = atan2(airspeed_mps * turn_rate_radps, GRAVITY_MPS2);
-        let share = airframe.stall_mps / airspeed_mps.max(1.0);
-        let pitch_rad = STALL_RAD * share * share / cos(bank_rad) - INCIDENCE_RAD;
+        let pitch_rad = pitch_rad(airframe, airspeed_mps, bank_rad);
         let (s, c) = sin_cos(heading_rad);
         let (ahead, side, up) = (
             Vector3::new(c, s, 0.0),

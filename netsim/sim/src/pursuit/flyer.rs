@@ -298,6 +298,7 @@ impl Flyer {
             height_m: self.body.height_m(),
             steps,
             loiter: Side::Left,
+            gimbal: Vec::new(),
         };
         self.body.apply(setpoint, now_ms);
     }

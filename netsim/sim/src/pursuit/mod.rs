@@ -34,6 +34,7 @@ use nalgebra::Matrix2;
 use roads::Roads;
 use sensor::{Noise, Seen};
 use skein_flight::airframe::Airframe;
+use skein_flight::mount::Mount;
 use skein_flight::tracking::bend::Guard;
 use skein_flight::tracking::estimate::{Detection, Estimate};
 use skein_flight::tracking::field::Field;
@@ -140,6 +141,7 @@ pub fn airframe() -> Airframe {
         reserve_s: 300.0,
         footprint_across_m: 40.0,
         footprint_along_m: 30.0,
+        mount: Mount::Level,
     }
 }
 

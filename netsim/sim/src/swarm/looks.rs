@@ -115,17 +115,38 @@ impl Swarm {
             return;
         };
         let counted: Vec<(bool, Count)> = mind.counted().collect();
-        let airframe = body.airframe();
         let look = CountLook {
             uav: id,
-            pose: body.pose(),
+            picture: body.picture(),
             is_late: peer.slow_ms > 0,
-            half_m: (airframe.footprint_across_m, airframe.footprint_along_m),
             counted: &counted,
         };
         let truth: Vec<Point> = self.air.vehicles().places().collect();
         let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
         rules.counts.on_look(self.now_ms, &truth, look, found);
+    }
+
+    /// A UAV looked: the middle of its picture is judged beside where it is planned.
+    pub(super) fn note_footprint(&mut self, idx: usize) {
+        let peer = &self.peers[idx];
+        let id = peer.id();
+        // A twin, or who is late, does not fly what it plans.
+        let flies = peer.process == Process::Running
+            && peer.slow_ms == 0
+            && self.airframe_of(id) == id
+            && self.air.world().commands(id);
+        let Some(body) = self.air.world().body(id).filter(|_| flies) else {
+            return;
+        };
+        let Some(footprint) = peer.peer.as_ref().and_then(|p| p.footprint()) else {
+            return;
+        };
+        let is_held = body.airframe().mount.gimbal().is_some();
+        let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
+        let look = (self.now_ms, id);
+        rules
+            .footprint
+            .on_look(look, footprint, &body.picture(), is_held, found);
     }
 
     /// What the ground station knows of counts, beside what is true.

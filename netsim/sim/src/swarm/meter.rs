@@ -3,6 +3,8 @@
 //! The simulator looks at no clock. Whoever wants to know lends it one, and what it shows
 //! changes nothing in the run.
 
+use super::latency::{Asked, Latency};
+
 /// What a run spends its time on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Part {
@@ -57,6 +59,9 @@ pub struct Meter {
     since_ns: u64,
     spent_ns: [u64; Part::ALL.len()],
     inputs: u64,
+    answers: [Latency; Asked::ALL.len()],
+    /// The longest of a percept, nanoseconds, and what was planned meanwhile.
+    longest: Option<(u64, &'static str)>,
 }
 
 impl Meter {
@@ -83,6 +88,44 @@ impl Meter {
     /// A peer is given an input.
     pub(super) fn input(&mut self) {
         self.inputs += 1;
+    }
+
+    /// What its clock shows; none where none was lent.
+    pub(super) fn now_ns(&self) -> Option<u64> {
+        self.clock.map(|clock| clock())
+    }
+
+    /// A peer answered an input that it was given then, while this was planned for it.
+    pub(super) fn answered(
+        &mut self,
+        from_ns: Option<u64>,
+        is_percept: bool,
+        plan: Option<&'static str>,
+    ) {
+        let Some(took_ns) = self.now_ns().zip(from_ns).map(|(to, from)| to - from) else {
+            return;
+        };
+        let asked = match (is_percept, plan) {
+            (false, _) => Asked::Other,
+            (true, None) => Asked::Percept,
+            (true, Some(_)) => Asked::PerceptBesidePlan,
+        };
+        self.answers[asked as usize].note(took_ns);
+        if is_percept && self.longest.is_none_or(|(ns, _)| took_ns > ns) {
+            self.longest = Some((took_ns, plan.unwrap_or("no plan")));
+        }
+    }
+
+    /// How long inputs of a kind took.
+    #[must_use]
+    pub fn answers(&self, asked: Asked) -> &Latency {
+        &self.answers[asked as usize]
+    }
+
+    /// The longest from a percept to its setpoint, nanoseconds, and what was planned meanwhile.
+    #[must_use]
+    pub fn longest(&self) -> Option<(u64, &'static str)> {
+        self.longest
     }
 
     /// What a part took so far, but for what is under way, nanoseconds.

@@ -19,10 +19,12 @@
 //! | `fault_effects` | what each fault does |
 //! | [`outcome`] | what a run came to |
 //! | [`meter`] | how long its parts take |
+//! | [`latency`] | how long a peer takes to answer one input |
 
 mod air;
 mod fault_effects;
 mod judged_loop;
+pub mod latency;
 mod looks;
 pub mod meter;
 mod names;
@@ -385,6 +387,7 @@ impl Swarm {
                 answer,
             } => {
                 if self.peers[idx].boots == boot {
+                    self.peers[idx].plan = None;
                     self.fold(idx, Kind::Planned, token);
                     self.feed(
                         idx,
@@ -435,6 +438,7 @@ impl Swarm {
             .push(again_ms, Phase::Sense, Event::Percept { idx, boot });
         self.feed(idx, Input::Percept(percept));
         self.note_counts(idx);
+        self.note_footprint(idx);
     }
 
     fn advance_world(&mut self) {
@@ -636,8 +640,11 @@ impl Swarm {
             s.told_fuel_s = percept.endurance_s;
         }
         self.meter.input();
+        let (is_percept, plan) = (matches!(input, Input::Percept(_)), s.plan);
         let before = self.meter.enter(Part::Peer);
+        let from_ns = self.meter.now_ns();
         peer.handle(s.clock.reads(now_ms), input);
+        self.meter.answered(from_ns, is_percept, plan);
         self.meter.enter(before);
         while let Some(output) = peer.poll() {
             self.perform(idx, &peer, output);
@@ -698,10 +705,12 @@ impl Swarm {
                     .push(done_ms, Phase::Answer, Event::Stored { idx, boot });
             }
             Output::Compute { token, job } => {
-                let takes_ms = match job {
-                    Job::Geometry(_) => GEOMETRY_MS,
-                    Job::Divide { .. } | Job::Errand(_) => DIVIDE_MS,
+                let (takes_ms, plan) = match job {
+                    Job::Geometry(_) => (GEOMETRY_MS, "geometry"),
+                    Job::Divide { .. } => (DIVIDE_MS, "division"),
+                    Job::Errand(_) => (DIVIDE_MS, "errand"),
                 };
+                self.peers[idx].plan = Some(plan);
                 let before = self.meter.enter(Part::Planning);
                 let answer = self.geometry_cache.answer(&job);
                 self.meter.enter(Part::Checks);

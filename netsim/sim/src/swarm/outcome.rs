@@ -100,6 +100,12 @@ impl Swarm {
                     .collect(),
                 bytes_by_kind: self.traffic.bytes_by_kind(),
                 wind_errors: self.checker.rules.wind.errors(),
+                footprint_errors: self
+                    .spec
+                    .uavs
+                    .iter()
+                    .any(|u| !u.airframe.mount.is_level())
+                    .then(|| self.checker.rules.footprint.errors()),
             }),
         });
         Outcome {

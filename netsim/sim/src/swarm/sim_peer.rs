@@ -108,6 +108,8 @@ pub struct SimPeer {
     pub timer_ms: Option<u64>,
     /// The fuel that its last percept told it of, seconds.
     pub told_fuel_s: f64,
+    /// What is computed for it beside its mind, the last of it.
+    pub plan: Option<&'static str>,
     /// What it handed to its radio last.
     pub frame: Filling,
     /// Whether it held that the mission is finished when last judged.
@@ -141,6 +143,7 @@ impl SimPeer {
             inbox: VecDeque::new(),
             timer_ms: None,
             told_fuel_s: 0.0,
+            plan: None,
             frame: Filling::default(),
             finished: false,
             silent: false,
@@ -180,6 +183,7 @@ impl SimPeer {
         self.silent = false;
         self.is_lifeless = false;
         self.inbox.clear();
+        self.plan = None;
         self.peer = Some(Box::new(Peer::new(self.config.clone())));
         #[allow(
             clippy::cast_possible_truncation,

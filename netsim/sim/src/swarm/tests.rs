@@ -5,6 +5,7 @@ use crate::account::Cause;
 use crate::fault::{Fault, Order};
 use crate::runs::{self, Wanted};
 use crate::world::fixture;
+use skein_flight::mount::Mount;
 use skein_flight::trajectory::wind::Wind;
 use skein_peer::{CoverageTask, PointTask};
 
@@ -805,4 +806,36 @@ fn no_program_is_started_in_an_airframe_that_is_gone() {
     };
     assert!(!o.entries.iter().any(booted));
     assert_eq!(o.dead, 1);
+}
+
+/// Cameras fixed to the airframe, and peers who know it or take them for level.
+fn with_fixed_cameras(know_it: bool) -> Vec<String> {
+    let mut spec = fixture::square(2);
+    spec.zones.clear();
+    let mut mission = (*spec.mission).clone();
+    mission.zones.clear();
+    spec.mission = Arc::new(mission);
+    for u in &mut spec.uavs {
+        u.airframe.mount = Mount::Fixed;
+    }
+    let prepared = Prepared::new(spec);
+    let mut swarm = Swarm::new(&prepared, 1, Vec::new(), false);
+    for peer in swarm.peers.iter_mut().filter(|_| !know_it) {
+        if let Some(airframe) = &mut peer.config.airframe {
+            airframe.mount = Mount::Level;
+        }
+    }
+    swarm.run_until(300_000);
+    assert!(swarm.covered_share() > 0.2, "{}", swarm.covered_share());
+    let broken = swarm.checker().found.counts.keys();
+    broken.map(|rule| (*rule).to_string()).collect()
+}
+
+/// The loop is seen in turns, too, where a fixed camera looks elsewhere: who ignores its bank
+/// marks what no camera saw, and who does not says nothing wrong.
+#[test]
+fn who_ignores_the_bank_claims_what_no_camera_saw() {
+    assert!(with_fixed_cameras(false).iter().any(|rule| rule == "S6"));
+    let knowing = with_fixed_cameras(true);
+    assert!(!knowing.iter().any(|rule| rule == "S6"), "{knowing:?}");
 }

@@ -1,15 +1,13 @@
 //! What one mission asks to be seen, and what cameras saw of it (D2.7 §3.6).
-//!
-//! The camera looks straight down and stays level in turns.
 
+use super::camera::{Eye, Picture};
 use super::fact::Fact;
 use super::motion::Piece;
 use super::pieces::Pieces;
 use super::survey::{Cell, Survey};
 use super::watch::Watch;
-use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CellId;
-use skein_geometry::frame::Pose;
+use skein_geometry::frame::{Point, Pose, Vector};
 use skein_peer::mission::{PointMm, ring_mm};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -48,12 +46,6 @@ pub(super) struct Board {
     marks: u64,
     /// How often it is seen again, where the mission goes on once everything is seen.
     watch: Option<Watch>,
-}
-
-/// From corner to corner of a picture, metres.
-pub(super) fn diagonal_m(airframe: &Airframe) -> f64 {
-    let (a, b) = (airframe.footprint_across_m, airframe.footprint_along_m);
-    (a * a + b * b).sqrt()
 }
 
 fn is_coverable(cell: &Cell) -> bool {
@@ -236,20 +228,14 @@ impl Board {
         self.complete()
     }
 
-    pub(super) fn look(
-        &mut self,
-        uav: u16,
-        airframe: &Airframe,
-        piece: &Piece,
-        facts: &mut Vec<Fact>,
-    ) {
+    pub(super) fn look(&mut self, uav: u16, eye: &Eye<'_>, piece: &Piece, facts: &mut Vec<Fact>) {
         let length_m = piece.length_m();
-        let reach_m = self.reach_m(airframe) + length_m;
+        let reach_m = self.reach_m(eye) + length_m;
         let new = match self.survey.pieces() {
             Some(pieces) => pieces
                 .near(piece.start.position(), reach_m)
                 .any(|i| self.seen[i].is_none()),
-            None => self.anything_new(piece.start, reach_m),
+            None => self.anything_new(piece.start.position(), reach_m),
         };
         if !new && self.claims.is_none() && self.watch.is_none() {
             return;
@@ -266,22 +252,24 @@ impl Board {
             let dt_s = span_ms as f64 / 1000.0 * f64::from(k) / f64::from(n);
             let at_ms = piece.from_ms + span_ms * u64::from(k) / u64::from(n);
             let pose = piece.pose_after(dt_s);
+            let (picture, sighting) = (eye.picture(pose, at_ms), Sighting { at_ms, uav });
             if self.survey.pieces().is_some() {
-                self.snap_pieces(uav, airframe, pose, at_ms, facts);
+                self.snap_pieces(eye, &picture, sighting, facts);
+            } else if eye.is_level() {
+                self.snap(eye, pose, sighting, facts);
             } else {
-                self.snap(uav, airframe, pose, at_ms, facts);
+                self.snap_turned(eye, &picture, sighting, facts);
             }
-            self.snap_claims(airframe, pose);
+            self.snap_claims(eye, &picture);
         }
     }
 
-    fn snap_claims(&mut self, airframe: &Airframe, pose: Pose) {
+    fn snap_claims(&mut self, eye: &Eye<'_>, picture: &Picture) {
         let Some((pieces, seen)) = &mut self.claims else {
             return;
         };
-        let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
-        for i in pieces.near(pose.position(), diagonal_m(airframe)) {
-            if !seen[i] && pieces.held(i, pose, across_m, along_m) {
+        for i in pieces.near(picture.from(), eye.reach_m()) {
+            if !seen[i] && pieces.held(i, picture) {
                 seen[i] = true;
                 self.marks += 1;
             }
@@ -291,20 +279,44 @@ impl Board {
     /// One picture of a mission for targets: marks the pieces that lie in it whole.
     fn snap_pieces(
         &mut self,
-        uav: u16,
-        airframe: &Airframe,
-        pose: Pose,
-        at_ms: u64,
+        eye: &Eye<'_>,
+        picture: &Picture,
+        sighting: Sighting,
         facts: &mut Vec<Fact>,
     ) {
         let survey = Arc::clone(&self.survey);
         let Some(pieces) = survey.pieces() else {
             return;
         };
-        let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
-        for i in pieces.near(pose.position(), self.reach_m(airframe)) {
-            if self.looks_for(i) && pieces.held(i, pose, across_m, along_m) {
-                self.see(i, Sighting { at_ms, uav }, facts);
+        for i in pieces.near(picture.from(), self.reach_m(eye)) {
+            if self.looks_for(i) && pieces.held(i, picture) {
+                self.see(i, sighting, facts);
+            }
+        }
+    }
+
+    /// One picture of a camera that tilts: marks the cells that lie in it whole, corner by corner.
+    fn snap_turned(
+        &mut self,
+        eye: &Eye<'_>,
+        picture: &Picture,
+        sighting: Sighting,
+        facts: &mut Vec<Fact>,
+    ) {
+        let from = picture.from();
+        let (c0, c1, r0, r1) = self.near(from, self.reach_m(eye));
+        let (d, half_m) = (self.survey.lane_m(), self.survey.extent_m() / 2.0);
+        for row in r0..=r1 {
+            for col in c0..=c1 {
+                let Some(i) = self.survey.at(col, row).filter(|i| self.looks_for(*i)) else {
+                    continue;
+                };
+                let middle = Point::new((f64::from(col) + 0.5) * d, (f64::from(row) + 0.5) * d);
+                let corner = |x: f64, y: f64| middle + Vector::new(x, y) * half_m;
+                let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+                if picture.holds(&corners.map(|(x, y)| corner(x, y))) {
+                    self.see(i, sighting, facts);
+                }
             }
         }
     }
@@ -341,16 +353,13 @@ impl Board {
     }
 
     /// How far from the camera the centre of a cell in its picture can be.
-    fn reach_m(&self, airframe: &Airframe) -> f64 {
-        if self.survey.pieces().is_some() {
+    fn reach_m(&self, eye: &Eye<'_>) -> f64 {
+        if self.survey.pieces().is_some() || !eye.is_level() {
             // A corner of a piece may lie in a corner of the picture.
-            return diagonal_m(airframe);
+            return eye.reach_m();
         }
         let half = self.survey.extent_m() / 2.0;
-        let (a, b) = (
-            airframe.footprint_across_m - half,
-            airframe.footprint_along_m - half,
-        );
+        let (a, b) = (eye.across_m - half, eye.along_m - half);
         if a < 0.0 || b < 0.0 {
             0.0
         } else {
@@ -358,7 +367,7 @@ impl Board {
         }
     }
 
-    fn near(&self, pose: Pose, reach_m: f64) -> (i32, i32, i32, i32) {
+    fn near(&self, at: Point, reach_m: f64) -> (i32, i32, i32, i32) {
         let d = self.survey.lane_m();
         #[allow(
             clippy::cast_possible_truncation,
@@ -368,41 +377,26 @@ impl Board {
             |v: f64| ((v - reach_m) / d - 0.5).ceil() as i32,
             |v: f64| ((v + reach_m) / d - 0.5).floor() as i32,
         );
-        (
-            lo(pose.east_m),
-            hi(pose.east_m),
-            lo(pose.north_m),
-            hi(pose.north_m),
-        )
+        (lo(at.x), hi(at.x), lo(at.y), hi(at.y))
     }
 
-    fn anything_new(&self, pose: Pose, reach_m: f64) -> bool {
-        let (c0, c1, r0, r1) = self.near(pose, reach_m);
+    fn anything_new(&self, at: Point, reach_m: f64) -> bool {
+        let (c0, c1, r0, r1) = self.near(at, reach_m);
         (r0..=r1).any(|r| {
             (c0..=c1).any(|c| self.survey.at(c, r).is_some_and(|i| self.seen[i].is_none()))
         })
     }
 
-    /// One picture: marks the cells that lie in it whole.
+    /// One level picture: marks the cells that lie in it whole.
     ///
     /// A square turned by the heading sticks out from its centre by half a side times
     /// |cos| + |sin|, across as well as along.
-    fn snap(
-        &mut self,
-        uav: u16,
-        airframe: &Airframe,
-        pose: Pose,
-        at_ms: u64,
-        facts: &mut Vec<Fact>,
-    ) {
-        let (c0, c1, r0, r1) = self.near(pose, self.reach_m(airframe));
+    fn snap(&mut self, eye: &Eye<'_>, pose: Pose, sighting: Sighting, facts: &mut Vec<Fact>) {
+        let (c0, c1, r0, r1) = self.near(pose.position(), self.reach_m(eye));
         let d = self.survey.lane_m();
         let forward = pose.direction();
         let out_m = self.survey.extent_m() / 2.0 * (forward.x.abs() + forward.y.abs());
-        let (across, along) = (
-            airframe.footprint_across_m - out_m,
-            airframe.footprint_along_m - out_m,
-        );
+        let (across, along) = (eye.across_m - out_m, eye.along_m - out_m);
         for row in r0..=r1 {
             for col in c0..=c1 {
                 let Some(i) = self.survey.at(col, row) else {
@@ -418,7 +412,7 @@ impl Board {
                 let inside = (x * forward.x + y * forward.y).abs() <= along
                     && (y * forward.x - x * forward.y).abs() <= across;
                 if inside {
-                    self.see(i, Sighting { at_ms, uav }, facts);
+                    self.see(i, sighting, facts);
                 }
             }
         }

@@ -1,26 +1,17 @@
-//! What the detectors on board of a mission's UAVs have in common: a camera that looks straight
-//! down and stays level, places with errors, some missed; drawn from the seed, the UAV and the
+//! What the detectors on board of a mission's UAVs have in common: what is in the picture of
+//! their camera, places with errors, some missed; drawn from the seed, the UAV and the
 //! time alone, so who asks twice at one time is told the same.
 
 use super::motion::Kinematic;
 use super::obstacles::{Obstacles, Place};
 use crate::pursuit::sensor::{Noise, rooted};
 use skein_flight::tracking::estimate::Detection;
-use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::frame::{Point, Vector};
 use skein_geometry::random::{SplitMix64, mix};
-
-/// Whether a place is in a picture that is taken from straight above: half of it reaches so far
-/// across and along, metres.
-pub fn frames(pose: Pose, at: Point, (across_m, along_m): (f64, f64)) -> bool {
-    let (forward, to) = (pose.direction(), at - pose.position());
-    forward.dot(&to).abs() <= along_m && forward.perp(&to).abs() <= across_m
-}
 
 /// Whether a place is in the picture of a UAV.
 pub fn is_in_view(body: &Kinematic, at: Point) -> bool {
-    let airframe = body.airframe();
-    let half_m = (airframe.footprint_across_m, airframe.footprint_along_m);
-    frames(body.pose(), at, half_m)
+    body.picture().shows(at, 1.0)
 }
 
 /// Whether a place is in the picture of a UAV, and nothing stands in between.

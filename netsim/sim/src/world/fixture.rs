@@ -5,6 +5,7 @@
 use crate::fault::{Fault, TimedFault};
 use crate::spec::{Building, GroundStationSpec, RadioSpec, Spec, StormSpec, TroubleSpec, UavSpec};
 use skein_flight::airframe::Airframe;
+use skein_flight::mount::Mount;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::{FRAC_PI_2, PI};
@@ -33,6 +34,7 @@ pub fn airframe() -> Airframe {
         reserve_s: 60.0,
         footprint_across_m: 46.0,
         footprint_along_m: 36.0,
+        mount: Mount::Level,
     }
 }
 

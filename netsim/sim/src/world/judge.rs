@@ -1,9 +1,10 @@
 //! What truly happened: cells seen, zones entered, separation (D2.7 §3.6, §2.3.1).
 //!
 //! The judge follows the flown pieces themselves, not reports, and uses only the
-//! world's own geometry. The camera looks straight down and stays level in turns.
+//! world's own geometry.
 
 use super::board::Board;
+use super::camera::Eye;
 use super::fact::{Approach, Fact};
 use super::motion::Piece;
 use super::no_fly::{TurnAway, Zones};
@@ -12,7 +13,6 @@ use super::pieces::Pieces;
 use super::separation::Separation;
 use super::survey::Survey;
 use super::task_board::TaskBoard;
-use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::CellId;
 use skein_geometry::frame::Point;
 use std::collections::BTreeSet;
@@ -186,16 +186,23 @@ impl Judge {
     }
 
     /// Judges one flown piece of a UAV.
-    pub fn watch(&mut self, uav: u16, airframe: &Airframe, piece: &Piece, facts: &mut Vec<Fact>) {
+    pub fn watch<'a>(
+        &mut self,
+        uav: u16,
+        eye: impl Into<Eye<'a>>,
+        piece: &Piece,
+        facts: &mut Vec<Fact>,
+    ) {
+        let eye = &eye.into();
         let last = self.boards.len() - 1;
         for (i, board) in self.boards.iter_mut().enumerate() {
             // What of an older mission is seen is no news.
             let mut old = Vec::new();
             let told = if i == last { &mut *facts } else { &mut old };
-            board.look(uav, airframe, piece, told);
+            board.look(uav, eye, piece, told);
         }
         self.zones.watch(uav, piece, facts);
-        self.tasks.look(uav, airframe, piece);
+        self.tasks.look(uav, eye, piece);
     }
 
     /// A task, by number and revision, is to be seen by one of these UAVs; asked twice it is
@@ -236,7 +243,10 @@ impl Judge {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::world::camera::Camera;
     use crate::world::fixture::{airframe, polygon, square};
+    use skein_flight::airframe::Airframe;
+    use skein_flight::mount::Mount;
     use skein_geometry::frame::Pose;
     use skein_peer::mission::PointMm;
     use skein_peer::{CoverageTask, PointTask};
@@ -527,6 +537,45 @@ mod tests {
         assert_eq!(s.uav, 7);
         assert!((s.at_ms as i64 - (1000 + 156_000 / 13)).abs() < 90, "{s:?}");
         assert!((j.covered_share() - 10.0 / 80.0).abs() < 1e-12);
+    }
+
+    /// In a turn the picture of a fixed camera lies out of it: what a level one sees it does not.
+    #[test]
+    fn a_cell_inside_a_turn_is_not_seen_by_a_fixed_camera() {
+        let fixed = Airframe {
+            mount: Mount::Fixed,
+            ..airframe()
+        };
+        let turns = |east_m: f64, radius_m: f64, ms: u64| {
+            piece(east_m, 168.0 - radius_m, 0.0, ms, 13.0 / radius_m)
+        };
+        let before = turns(100.0, 30.0, 1_000);
+        let flown = Piece {
+            from_ms: 2_000,
+            to_ms: 12_000,
+            start: before.pose_at(2_000),
+            ..before
+        };
+        let inside = CellId { col: 1, row: 3 };
+        let saw = |eye: Eye<'_>| {
+            let mut judge = judge_with(&[]);
+            judge.watch(1, eye, &flown, &mut Vec::new());
+            (judge.saw(1, inside, 1), judge.n_covered())
+        };
+        let mut camera = Camera::new(&fixed);
+        camera.follow(&fixed, &before);
+        camera.begin();
+        camera.follow(&fixed, &flown);
+        let (level, tilted) = (saw(Eye::from(&fixed)), saw(Eye::new(&fixed, &camera, 60.0)));
+        assert!(level.0 && !tilted.0, "{level:?} {tilted:?}");
+        // On a straight pass it sees what a level one does.
+        let along = piece(20.0, 168.0, 0.0, 20_000, 0.0);
+        let mut camera = Camera::new(&fixed);
+        camera.follow(&fixed, &along);
+        let mut judge = judge_with(&[]);
+        let eye = Eye::new(&fixed, &camera, 60.0);
+        judge.watch(1, eye, &along, &mut Vec::new());
+        assert!(judge.n_covered() >= 5, "{}", judge.n_covered());
     }
 
     #[test]

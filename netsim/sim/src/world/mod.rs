@@ -5,6 +5,7 @@
 //! of a tick is act, move, radio, sense, decide.
 
 mod board;
+pub mod camera;
 pub mod contour;
 pub(crate) mod detector;
 pub mod fact;
@@ -263,6 +264,13 @@ impl World {
         self.uav(number).map(|u| &u.body)
     }
 
+    /// Whether the computer with this number is the one whose setpoints fly its airframe.
+    #[must_use]
+    pub fn commands(&self, number: u16) -> bool {
+        self.uav(number)
+            .is_some_and(|u| u.commander == number && u.body.is_commanded(self.now_ms))
+    }
+
     /// The UAV in which the computer with this number is.
     fn uav(&self, number: u16) -> Option<&Uav> {
         self.uavs.get(self.seat(number)?)
@@ -386,6 +394,8 @@ impl World {
         let body = self.body(uav)?;
         let ground_ms = body.takes_off_in_ms(self.now_ms);
         let own = self.weather.sensed(body.percept()?, self.seed, uav);
+        let attitude = own.attitude;
+        let attitude = attitude.map(|a| camera::sensed(a, self.seed, uav, self.now_ms));
         Some(Percept {
             time_ms: self.now_ms,
             takes_off_in_ms: u32::try_from(ground_ms).unwrap_or(u32::MAX),
@@ -396,6 +406,7 @@ impl World {
             contour: self.contour.as_ref().map_or_else(Default::default, |c| {
                 c.look(body, uav, self.now_ms, &self.site.obstacles)
             }),
+            attitude,
             ..own
         })
     }
@@ -528,8 +539,7 @@ impl World {
             self.flown.clear();
             u.body.advance(to_ms, &mut self.flown);
             for piece in &self.flown {
-                self.judge
-                    .watch(u.id, u.body.airframe(), piece, &mut self.facts);
+                self.judge.watch(u.id, u.body.eye(), piece, &mut self.facts);
             }
             if u.body.failsafe() != u.failsafe && u.body.airborne() {
                 u.failsafe = u.body.failsafe();
@@ -584,6 +594,7 @@ mod tests {
                 duration_ms: 1000,
             }],
             loiter: Side::Left,
+            gimbal: Vec::new(),
         }
     }
 

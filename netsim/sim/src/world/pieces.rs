@@ -1,8 +1,9 @@
 //! Pieces of targets as the judge sees them: which lie near a camera, and which its
 //! picture holds whole (D2.7 §3.3).
 
+use super::camera::Picture;
 use super::flat::Bounds;
-use skein_geometry::frame::{Point, Pose};
+use skein_geometry::frame::Point;
 use std::collections::BTreeMap;
 
 /// Side of the squares by which pieces are looked up, metres: about as far as a camera
@@ -54,20 +55,17 @@ impl Pieces {
             .copied()
     }
 
-    /// Whether a picture from `pose`, of these half sizes, holds a piece whole.
+    /// Whether a picture holds a piece whole.
     #[must_use]
-    pub fn held(&self, n: usize, pose: Pose, across_m: f64, along_m: f64) -> bool {
-        let forward = pose.direction();
-        self.rings[n].iter().all(|corner| {
-            let v = corner - pose.position();
-            v.dot(&forward).abs() <= along_m && forward.perp(&v).abs() <= across_m
-        })
+    pub fn held(&self, n: usize, picture: &Picture) -> bool {
+        picture.holds(&self.rings[n])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use skein_geometry::frame::Pose;
 
     #[test]
     fn a_turned_picture_holds_what_lies_along_it() {
@@ -75,11 +73,11 @@ mod tests {
         let road = [at(70.0, 0.0), at(110.0, 0.0), at(110.0, 4.0), at(70.0, 4.0)];
         let pieces = Pieces::new(vec![road]);
         let east = Pose::new(at(90.0, 0.0), 0.0);
-        assert!(pieces.held(0, east, 5.0, 21.0));
-        assert!(!pieces.held(0, east, 5.0, 19.0));
+        assert!(pieces.held(0, &Picture::level(east, (5.0, 21.0))));
+        assert!(!pieces.held(0, &Picture::level(east, (5.0, 19.0))));
         let north = Pose::new(at(90.0, 0.0), core::f64::consts::FRAC_PI_2);
-        assert!(!pieces.held(0, north, 5.0, 21.0));
-        assert!(pieces.held(0, north, 21.0, 5.0));
+        assert!(!pieces.held(0, &Picture::level(north, (5.0, 21.0))));
+        assert!(pieces.held(0, &Picture::level(north, (21.0, 5.0))));
         assert_eq!(pieces.near(at(60.0, 10.0), 30.0).count(), 1);
         assert_eq!(pieces.near(at(-60.0, 10.0), 30.0).count(), 0);
     }

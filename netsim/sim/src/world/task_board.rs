@@ -1,11 +1,11 @@
 //! Which tasks other than coverage were seen, by whom and when, as the judge sees it: by the
 //! flown pieces and geometry of its own (D2.7 §3.2).
 
-use super::board::{LOOK_M, Sighting, diagonal_m};
+use super::board::{LOOK_M, Sighting};
+use super::camera::{Eye, Picture};
 use super::motion::Piece;
 use super::pieces::Pieces;
-use skein_flight::airframe::Airframe;
-use skein_geometry::frame::{Point, Pose};
+use skein_geometry::frame::Point;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A task that is to be seen.
@@ -56,7 +56,7 @@ impl TaskBoard {
     }
 
     /// Looks along a flown piece.
-    pub(super) fn look(&mut self, uav: u16, airframe: &Airframe, piece: &Piece) {
+    pub(super) fn look(&mut self, uav: u16, eye: &Eye<'_>, piece: &Piece) {
         if self.open == 0 {
             return;
         }
@@ -71,16 +71,16 @@ impl TaskBoard {
             #[allow(clippy::cast_precision_loss, reason = "milliseconds of one step")]
             let dt_s = span_ms as f64 / 1000.0 * f64::from(k) / f64::from(n);
             let at_ms = piece.from_ms + span_ms * u64::from(k) / u64::from(n);
-            self.snap(airframe, piece.pose_after(dt_s), Sighting { at_ms, uav });
+            let picture = eye.picture(piece.pose_after(dt_s), at_ms);
+            self.snap(eye.reach_m(), &picture, Sighting { at_ms, uav });
         }
     }
 
-    fn snap(&mut self, airframe: &Airframe, pose: Pose, sighting: Sighting) {
-        let (across_m, along_m) = (airframe.footprint_across_m, airframe.footprint_along_m);
+    fn snap(&mut self, reach_m: f64, picture: &Picture, sighting: Sighting) {
         let open = self.tasks.values_mut().filter(|t| t.left > 0);
         for task in open.filter(|t| t.carriers.contains(&sighting.uav)) {
-            for i in task.pieces.near(pose.position(), diagonal_m(airframe)) {
-                if !task.seen[i] && task.pieces.held(i, pose, across_m, along_m) {
+            for i in task.pieces.near(picture.from(), reach_m) {
+                if !task.seen[i] && task.pieces.held(i, picture) {
                     task.seen[i] = true;
                     task.left -= 1;
                     task.last = Some(sighting);
@@ -96,6 +96,7 @@ mod tests {
     use super::*;
     use crate::world::fixture::airframe;
     use skein_flight::trajectory::wind::Wind;
+    use skein_geometry::frame::Pose;
 
     fn flown(uav: u16, from: (f64, f64), board: &mut TaskBoard) {
         let piece = Piece {
@@ -106,7 +107,7 @@ mod tests {
             turn_rate_radps: 0.0,
             wind: Wind::CALM,
         };
-        board.look(uav, &airframe(), &piece);
+        board.look(uav, &Eye::from(&airframe()), &piece);
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! Vehicles on the ground in a mission's world, and what cameras see of them (D2.7 §1.5.2,
-//! §3.7): the vehicles of pursuits under the camera of a mission, which looks straight down
-//! and stays level in turns, as the judge takes it.
+//! §3.7): the vehicles of pursuits under the camera of a mission.
 //!
 //! # Guarantees
 //! Truth stays here: percepts hold places with errors, misses and false alarms, drawn from the
@@ -16,7 +15,7 @@ use crate::pursuit::vehicle::Vehicle;
 use crate::spec::VehicleSpec;
 use skein_behaviors::sightings::{Sighted, Sightings};
 use skein_flight::tracking::estimate::Detection;
-use skein_geometry::frame::{Point, Vector};
+use skein_geometry::frame::Point;
 use skein_geometry::math::seconds;
 use skein_geometry::random::{SplitMix64, mix};
 use skein_peer::mission::mm;
@@ -143,11 +142,7 @@ impl Vehicles {
         let (x, y) = (2.0 * random.unit() - 1.0, 2.0 * random.unit() - 1.0);
         let kind = random.below(usize::from(KINDS));
         if is_false {
-            let pose = body.pose();
-            let (forward, airframe) = (pose.direction(), body.airframe());
-            let left = Vector::new(-forward.y, forward.x);
-            let along = forward * (x * airframe.footprint_along_m);
-            let at = from + along + left * (y * airframe.footprint_across_m);
+            let at = body.picture().place(x, y);
             let told = Detection::from_sight(from, height_m, at, &noise.sight);
             let kind = u8::try_from(kind).unwrap_or(0);
             seen.push(sighted(at, &told, kind));
@@ -189,6 +184,7 @@ mod tests {
     use crate::pursuit::vehicle::{Behaviour, STEP_S};
     use crate::spec::Spec;
     use crate::world::{World, fixture};
+    use skein_geometry::frame::Vector;
 
     /// A UAV that stands above the road, level, and a vehicle that drives along below.
     fn scene(start: Point, behaviour: Behaviour) -> Spec {

@@ -59,6 +59,7 @@ pub(super) mod tests {
             reserve_s: 300.0,
             footprint_across_m: 40.0,
             footprint_along_m: 30.0,
+            mount: crate::mount::Mount::Level,
         }
     }
 

@@ -344,6 +344,7 @@ async fn a_percept_becomes_a_setpoint_that_answers_it() {
             height_m: 60.0,
             steps: Vec::new(),
             loiter: Side::Left,
+            gimbal: Vec::new(),
         })],
         _ => Vec::new(),
     });

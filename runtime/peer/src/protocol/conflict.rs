@@ -501,6 +501,7 @@ fn received(said: &Intent, now_ms: u64) -> Option<Statement<Motion>> {
 mod tests {
     use super::*;
     use skein_flight::airframe::Airframe;
+    use skein_flight::mount::Mount;
     use skein_flight::separation::Stretch;
 
     const LOITER: End = End::Loiter {
@@ -521,6 +522,7 @@ mod tests {
                     reserve_s: 300.0,
                     footprint_across_m: 40.0,
                     footprint_along_m: 30.0,
+                    mount: Mount::Level,
                 },
                 separation_m: 50.0,
             },

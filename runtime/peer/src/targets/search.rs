@@ -9,8 +9,9 @@
 //! | a second passes | chance drives on; what is in view is less likely; where to look next is chosen |
 //! | it is seen again, or seen by another later | the map is dropped |
 
-use super::{Fused, Sought, Targets, is_in_view, standing};
+use super::{Fused, INNER, Sought, Targets, standing};
 use skein_behaviors::Percept;
+use skein_behaviors::view::View;
 use skein_flight::tracking::chance::ChanceMap;
 use skein_flight::tracking::follower::TargetMotion;
 use skein_geometry::frame::{Point, Vector};
@@ -85,7 +86,8 @@ impl Targets {
             search.looked_ms = self.now_ms;
             let from = percept.pose;
             search.map.go_on(self.now_ms);
-            search.map.look(&|p| is_in_view(from, &airframe, p));
+            let view = View::of(percept, &airframe);
+            search.map.look(&|p| view.shows(p, INNER));
             let speed_mps = airframe.cruise_mps;
             let next = search.map.look_next(from.position(), speed_mps, may_fly);
             search.aim = next;

@@ -1,6 +1,7 @@
 //! What is counted beside what is true, on scenes made by hand.
 
 use super::*;
+use skein_geometry::frame::Pose;
 
 fn mission(what: Counted) -> Mission {
     let mut mission = (*crate::world::fixture::square(1).mission).clone();
@@ -59,8 +60,7 @@ impl Scene {
             let look = CountLook {
                 is_late: self.is_late,
                 uav: 1,
-                pose: Pose::new(at, 0.0),
-                half_m: (40.0, 30.0),
+                picture: Picture::level(Pose::new(at, 0.0), (40.0, 30.0)),
                 counted: &counted,
             };
             let now_ms = (s * 1000.0).round() as u64;

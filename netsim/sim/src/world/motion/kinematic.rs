@@ -5,6 +5,8 @@
 //! A leg is a circular arc or a line from an anchor pose. The pose at any time comes
 //! from the anchor in closed form, so it does not depend on how often somebody asked.
 
+use crate::world::camera::{Camera, Eye, Picture};
+use skein_behaviors::setpoint::GimbalStep;
 use skein_behaviors::{Percept, Setpoint, Side};
 use skein_flight::airframe::Airframe;
 use skein_flight::trajectory::wind::{Course, Heading, Wind};
@@ -140,6 +142,7 @@ pub struct Kinematic {
     /// The circle of the failsafe, once begun in a wind.
     hold: Option<Hold>,
     lost: Option<Loss>,
+    camera: Camera,
 }
 
 impl Kinematic {
@@ -165,6 +168,7 @@ impl Kinematic {
             failsafe: false,
             hold: None,
             lost: None,
+            camera: Camera::new(&airframe),
         }
     }
 
@@ -240,6 +244,18 @@ impl Kinematic {
         &self.airframe
     }
 
+    /// What looks down from it.
+    #[must_use]
+    pub fn eye(&self) -> Eye<'_> {
+        Eye::new(&self.airframe, &self.camera, self.height_m)
+    }
+
+    /// What is in its picture now.
+    #[must_use]
+    pub fn picture(&self) -> Picture {
+        self.eye().picture_now(self.pose())
+    }
+
     /// Its height slot above the origin, metres.
     #[must_use]
     pub fn height_m(&self) -> f64 {
@@ -275,6 +291,7 @@ impl Kinematic {
             traffic: skein_behaviors::traffic::Traffic::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
+            attitude: (!self.airframe.mount.is_level()).then(|| self.camera.attitude()),
         })
     }
 
@@ -289,7 +306,8 @@ impl Kinematic {
         let fresh_until_ms = setpoint.from_ms.min(now_ms) + FAILSAFE_MS;
         let future = setpoint.from_ms > now_ms + FAILSAFE_MS;
         let finite = setpoint.airspeed_mps.is_finite()
-            && setpoint.steps.iter().all(|s| s.turn_rate_radps.is_finite());
+            && setpoint.steps.iter().all(|s| s.turn_rate_radps.is_finite())
+            && setpoint.gimbal.iter().all(GimbalStep::is_finite);
         let older = self
             .setpoint
             .as_ref()
@@ -298,6 +316,7 @@ impl Kinematic {
             return false;
         }
         self.fresh_until_ms = fresh_until_ms;
+        self.camera.take(&setpoint);
         self.setpoint = Some(setpoint);
         true
     }
@@ -316,18 +335,21 @@ impl Kinematic {
     /// Flies on to a time and appends what was flown. An airframe out of fuel stops
     /// there and is lost.
     pub fn advance(&mut self, to_ms: u64, flown: &mut Vec<Piece>) {
+        self.camera.begin();
         while self.airborne() && self.now_ms < to_ms {
             let (rate, speed, until_ms) = self.command();
             self.steer(rate, speed);
             let next_ms = to_ms.min(until_ms).min(self.now_ms + self.fuel_ms);
             if next_ms > self.now_ms {
                 let start = self.leg.pose_at(self.now_ms);
-                flown.push(Piece {
+                let piece = Piece {
                     from_ms: self.now_ms,
                     to_ms: next_ms,
                     start,
                     ..self.leg
-                });
+                };
+                self.camera.follow(&self.airframe, &piece);
+                flown.push(piece);
             }
             self.fuel_ms -= next_ms - self.now_ms;
             self.now_ms = next_ms;
@@ -513,6 +535,7 @@ mod tests {
                 })
                 .collect(),
             loiter: Side::Right,
+            gimbal: Vec::new(),
         }
     }
 

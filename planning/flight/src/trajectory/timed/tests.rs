@@ -17,6 +17,7 @@ fn airframe() -> Airframe {
         reserve_s: 120.0,
         footprint_across_m: 20.0,
         footprint_along_m: 15.0,
+        mount: crate::mount::Mount::Level,
     }
 }
 
