@@ -966,7 +966,37 @@ impl Peer {
         self.cooperation.tasking.counted(percept_ms)
     }
 
-    /// What is known of the sites of its mission, for a person.
+    /// The places of its mission's streets that this UAV watches by its last percept, by their
+    /// numbers; none without streets.
+    #[must_use]
+    pub fn watched_streets(&self) -> Option<&BTreeSet<usize>> {
+        let percept_ms = self.percept.as_ref().map_or(0, |p| p.time_ms);
+        self.cooperation.tasking.watched(percept_ms)
+    }
+
+    /// What this UAV saw itself of how streets are used, in this life.
+    #[must_use]
+    pub fn own_usages(&self) -> Option<Usages> {
+        self.cooperation.tasking.own_usages()
+    }
+
+    /// What is known of how the streets of its mission are used, by all together.
+    #[must_use]
+    pub fn usages(&self) -> Option<Usages> {
+        let mission = &self.cooperation.state()?.geometry.mission;
+        self.cooperation.tasking.usages(mission)
+    }
+
+    /// The quickest ways that its mission asks for, by what is known now, and from its station to
+    /// all that was detected. Another way is [`Usages::hint`]'s.
+    #[must_use]
+    pub fn hints(&self) -> Vec<Hint> {
+        let state = self.cooperation.state();
+        let mission = state.map(|s| &s.geometry.mission);
+        mission.map_or_else(Vec::new, |m| self.cooperation.tasking.hints(m))
+    }
+
+    /// What is known of the sites of its mission and of its streets, for a person.
     fn counts_told(&self) -> Vec<String> {
         let Some(state) = self.cooperation.state() else {
             return Vec::new();
@@ -974,7 +1004,11 @@ impl Peer {
         let mission = &state.geometry.mission;
         let counts = self.cooperation.tasking.counts(mission);
         let of = mission.counts.iter().zip(counts);
-        of.map(|(site, count)| count.sentence(site)).collect()
+        let mut told: Vec<String> = of.map(|(site, count)| count.sentence(site)).collect();
+        let hints = self.hints();
+        told.extend(hints.iter().map(Hint::sentence));
+        told.extend(self.usages().iter().flat_map(Usages::sentences));
+        told
     }
 
     /// What it does and why, for a person.

@@ -119,6 +119,7 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         Body::Count(super::count::samples::count()),
         "871a123456781a00013df80e19ee481910d60000",
     ));
+    all.push((Body::Usage(super::usage::samples::usage()), "GOLDEN"));
     all
 }
 
