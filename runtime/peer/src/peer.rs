@@ -16,6 +16,7 @@ use crate::config::{PeerConfig, Role};
 use crate::cooperation::{Cooperation, Situation};
 use crate::diary::Diary;
 use crate::effect::{Effect, Effects, PendingJob, Promise};
+use crate::hint::Hint;
 use crate::inbound::{self, Heard};
 use crate::input::{AskedTask, TaskEdit};
 use crate::input::{Command, Input, Time};
@@ -31,6 +32,7 @@ use crate::protocol::relay::{Offer, Relay};
 use crate::task_desk::TaskView;
 use crate::timers::{Timer, Timers};
 use crate::transmission::Transmission;
+use crate::usage::Usages;
 use crate::why::{self, Other, Why};
 use crate::wire::codec::{self, Body};
 use crate::wire::count::Count;
@@ -42,7 +44,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use skein_behaviors::Percept;
 use skein_behaviors::wind_estimate::WindEstimate;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 /// Most stores under way: one per kind of promise and a few of covered cells. A driver

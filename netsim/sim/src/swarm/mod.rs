@@ -31,6 +31,7 @@ mod operator;
 pub mod outcome;
 mod queue;
 mod sim_peer;
+mod streets;
 pub(crate) mod stream;
 mod traffic;
 
@@ -145,6 +146,8 @@ pub struct Swarm {
     done: bool,
     /// All is over but the way home of those who are finished.
     homing: bool,
+    /// When UAVs were asked last what they saw of streets, milliseconds.
+    streets_at_ms: u64,
     unassigned: bool,
     traffic: Traffic,
     /// The bytes that a peer said last, for an outsider to spoil.
@@ -186,6 +189,7 @@ impl Swarm {
             spoken: BTreeMap::new(),
             done: false,
             homing: false,
+            streets_at_ms: 0,
             unassigned: false,
             traffic: Traffic::default(),
             last_said: Vec::new(),
@@ -435,6 +439,7 @@ impl Swarm {
             .push(again_ms, Phase::Sense, Event::Percept { idx, boot });
         self.feed(idx, Input::Percept(percept));
         self.note_counts(idx);
+        self.note_streets(idx);
     }
 
     fn advance_world(&mut self) {
@@ -833,6 +838,7 @@ impl Swarm {
         self.judge_detections(&peers);
         self.judge_contour(&peers);
         self.judge_counts(&peers);
+        self.judge_streets(&peers);
         self.unassigned = peers.iter().any(|m| !m.view.unassigned.is_empty());
         let mut flying = 0;
         let (mut finished, mut ended) = (true, true);

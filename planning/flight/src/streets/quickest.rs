@@ -14,6 +14,9 @@ use skein_geometry::frame::Point;
 /// Who asks is no farther from a street, metres.
 pub const REACH_M: f64 = 150.0;
 
+/// What is shorter is no part of a way, metres.
+const LEAST_M: f64 = 1e-6;
+
 /// A part of a way: a stretch, or some of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
@@ -126,7 +129,11 @@ impl Network {
                 }
             })
         });
-        legs.collect()
+        let mut legs = legs.collect::<Option<Vec<Leg>>>()?;
+        // Who begins or ends at a crossing drives nothing of the stretch that was found nearest.
+        let driven = legs.iter().any(|l| l.length_m() > LEAST_M);
+        legs.retain(|l| !driven || l.length_m() > LEAST_M);
+        Some(legs)
     }
 
     /// The middle line of a way, metres.

@@ -153,6 +153,12 @@ impl Usages {
         }
     }
 
+    /// Adds what somebody saw in the first interval, and turns.
+    pub fn with(&mut self, usage: &Usage) {
+        self.add(0, usage);
+        self.add(crate::wire::usage::subject_of_turn(0), usage);
+    }
+
     /// The streets of the mission.
     #[must_use]
     pub fn streets(&self) -> &Streets {

@@ -428,7 +428,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(19), None);
+        assert_eq!(Kind::of_number(20), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

@@ -1,0 +1,123 @@
+//! Where vehicles truly are on a network, by geometry of the judge's own.
+
+use crate::account::secs;
+use skein_flight::streets::{Network, Turn};
+use skein_geometry::frame::{Point, Vector};
+use std::collections::BTreeMap;
+
+/// Farther from a middle line nobody is on its street, metres.
+const ASIDE_M: f64 = 12.0;
+
+/// Of stretches that are about as near that counts along which a vehicle drives, metres.
+const ALIKE_M: f64 = 5.0;
+
+/// Who is so far from both ends of a stretch is well on it, metres.
+const WELL_ON_M: f64 = 15.0;
+
+/// What truly drove on a stretch.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Driven {
+    spent_ms: u64,
+    driven_m: f64,
+}
+
+impl Driven {
+    pub fn add(&mut self, ms: u64, mps: f64) {
+        self.spent_ms += ms;
+        self.driven_m += mps * secs(ms);
+    }
+
+    pub fn merge(&mut self, more: &Self) {
+        self.spent_ms += more.spent_ms;
+        self.driven_m += more.driven_m;
+    }
+
+    pub fn spent_s(&self) -> f64 {
+        secs(self.spent_ms)
+    }
+
+    /// Space-mean speed, m/s.
+    pub fn speed_mps(&self) -> Option<f64> {
+        (self.spent_ms > 0).then(|| self.driven_m / secs(self.spent_ms))
+    }
+}
+
+/// What truly was at the places that one UAV watched.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    pub watched_m_s: f64,
+    pub stretches: BTreeMap<u16, Driven>,
+}
+
+/// Where one vehicle is.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Located {
+    /// On which stretch, at which of its places.
+    pub on: Option<(u16, usize)>,
+    /// How fast, m/s.
+    pub speed_mps: f64,
+    well: Option<u16>,
+}
+
+impl Located {
+    /// It moved; says whether it took a turn.
+    pub fn step(
+        &mut self,
+        network: &Network,
+        (before, at): (Point, Point),
+        (_, apart_ms): (u64, u64),
+    ) -> Option<Turn> {
+        let moved = at - before;
+        self.speed_mps = moved.norm() / secs(apart_ms.max(1));
+        let found = locate(network, at, moved);
+        self.on = found.and_then(|(stretch, along_m)| {
+            Some((stretch, network.place_along(stretch, along_m)?))
+        });
+        let (stretch, along_m) = found?;
+        let length_m = network.edges().get(usize::from(stretch))?.length_m;
+        if along_m.min(length_m - along_m) < WELL_ON_M.min(length_m / 4.0) {
+            return None;
+        }
+        let was = self.well.replace(stretch).filter(|s| *s != stretch)?;
+        let over = network.between((was, stretch), at)?;
+        let turn = Turn {
+            from: was,
+            over,
+            to: stretch,
+        };
+        network.turn(turn).map(|_| turn)
+    }
+}
+
+/// On which stretch a vehicle is that moved so, and how far along it, metres.
+pub fn locate(network: &Network, at: Point, moved: Vector) -> Option<(u16, f64)> {
+    // The nearest place of each stretch that is near enough.
+    let mut near: Vec<(f64, f64, u16, f64)> = Vec::new();
+    for (n, edge) in (0_u16..).zip(network.edges()) {
+        let mut best: Option<(f64, f64, u16, f64)> = None;
+        let mut before_m = 0.0;
+        for w in edge.way.windows(2) {
+            let (line, to) = (w[1] - w[0], at - w[0]);
+            let length_m = line.norm();
+            let along_m = (line.dot(&to) / length_m).clamp(0.0, length_m);
+            let aside_m = (to - line * (along_m / length_m)).norm();
+            if aside_m <= ASIDE_M && best.is_none_or(|b| aside_m < b.0) {
+                let speed = moved.norm();
+                let across = if speed > 0.0 {
+                    (line.perp(&moved) / (length_m * speed)).abs()
+                } else {
+                    0.0
+                };
+                best = Some((aside_m, across, n, before_m + along_m));
+            }
+            before_m += length_m;
+        }
+        near.extend(best);
+    }
+    let least_m = near.iter().map(|n| n.0).fold(f64::INFINITY, f64::min);
+    near.retain(|n| n.0 <= least_m + ALIKE_M);
+    let of = near
+        .iter()
+        .min_by(|a, b| (a.0 + 12.0 * a.1).total_cmp(&(b.0 + 12.0 * b.1)));
+    of.map(|(_, _, stretch, along_m)| (*stretch, *along_m))
+}
