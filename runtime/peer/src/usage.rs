@@ -54,7 +54,7 @@ const WELL_ON_M: f64 = 15.0;
 const TURNED_MS: u64 = 30_000;
 
 /// What grows on and on is told once in so many intervals, and turns in twice as many.
-const TOLD_INTERVALS: u64 = 20;
+const TOLD_INTERVALS: u64 = 40;
 
 /// Most registers of others that are kept: all of forty authors and lives.
 pub const KNOWN_MAX: usize = 2_560;
@@ -63,11 +63,10 @@ pub const KNOWN_MAX: usize = 2_560;
 #[derive(Clone, Copy, Debug)]
 struct Along {
     begun_ms: u64,
-    /// The stretch and interval that it is on, where it came into view there, and how far it
-    /// drove from there at most.
-    on: Option<(u16, u16)>,
-    from_m: f64,
-    driven_m: f64,
+    /// The stretch that it is on.
+    stretch: Option<u16>,
+    /// The stretches and intervals in which it was counted last, the latest first.
+    counted: [Option<(u16, u16)>; 3],
     /// The stretch on which it was well last, and when.
     well: Option<(u16, u64)>,
 }
@@ -131,9 +130,8 @@ impl Along {
     fn begun(t: &Track) -> Self {
         Self {
             begun_ms: t.seen_ms.saturating_sub(t.watched_ms()),
-            on: None,
-            from_m: 0.0,
-            driven_m: 0.0,
+            stretch: None,
+            counted: [None; 3],
             well: None,
         }
     }
@@ -262,10 +260,11 @@ impl Using {
         let stands = velocity.norm() < STILL_MPS;
         let heading = if stands { Vector::zeros() } else { velocity };
         let at = t.estimate.position();
-        let Some(m) = net.matched(at, heading) else {
-            along.on = None;
+        let Some(m) = net.matched(at, heading, along.stretch) else {
+            along.stretch = None;
             return;
         };
+        along.stretch = Some(m.edge);
         let length_m = net.edges()[usize::from(m.edge)].length_m;
         let from_end_m = m.along_m.min(length_m - m.along_m);
         // A short stretch ends before anybody is fifteen metres from its ends.
@@ -278,21 +277,19 @@ impl Using {
         }
         let place = net.place_along(m.edge, m.along_m);
         if !place.is_some_and(|p| self.watched.contains(&p)) {
-            along.on = None;
             return;
         }
         let own = self.own.entry((interval, m.edge)).or_default();
-        if along.on != Some((m.edge, interval)) {
-            along.on = Some((m.edge, interval));
-            (along.from_m, along.driven_m) = (m.along_m, 0.0);
+        let on = Some((m.edge, interval));
+        if !along.counted.contains(&on) {
+            along.counted.rotate_right(1);
+            along.counted[0] = on;
             own.vehicles = own.vehicles.saturating_add(1);
         }
         own.spent_ms += apart_ms;
         own.stood_ms += if stands { apart_ms } else { 0 };
-        // Errors of a place to and fro are no way that was driven.
-        let driven_m = (m.along_m - along.from_m).abs().max(along.driven_m);
-        own.driven_m += driven_m - along.driven_m;
-        along.driven_m = driven_m;
+        // Of who stands, errors of its place to and fro are no way that was driven.
+        own.driven_m += if stands { 0.0 } else { velocity.norm() * seconds(apart_ms) };
     }
 
     /// One that was well on a stretch is well on another one.

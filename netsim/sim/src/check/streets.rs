@@ -29,17 +29,19 @@ pub use ways::{HintReport, StreetsReport};
 use truth::{Driven, Located, Seen};
 
 /// The time that a UAV counted in one life is off by no more than this, seconds, and this share;
-/// and at one stretch by so much.
+/// and at one stretch by so much from those who may be taken to be there.
 const SPENT_OFF_S: f64 = 10.0;
 const SPENT_OFF_SHARE: f64 = 0.15;
-const STRETCH_OFF_S: f64 = 8.0;
-const STRETCH_OFF_SHARE: f64 = 0.35;
+const STRETCH_OFF_S: f64 = 6.0;
+const STRETCH_OFF_SHARE: f64 = 0.25;
 
 /// The speed on a stretch by no more than this, m/s, and this share, where vehicles were there for
-/// so long together, seconds.
-const SPEED_OFF_MPS: f64 = 1.0;
-const SPEED_OFF_SHARE: f64 = 0.15;
+/// so long together, seconds, and so many of those who may be taken to be there were nowhere else:
+/// filters lag behind who brakes at each end of a stretch.
+const SPEED_OFF_MPS: f64 = 1.5;
+const SPEED_OFF_SHARE: f64 = 0.2;
 const SPEED_FROM_S: f64 = 30.0;
+const SPEED_SURE_SHARE: f64 = 0.5;
 
 /// What was watched by no more than this share, and so many metres times seconds.
 const WATCHED_OFF_SHARE: f64 = 0.03;
@@ -195,6 +197,14 @@ impl StreetCheck {
             {
                 let driven = watcher.truth.stretches.entry(stretch).or_default();
                 driven.add(apart_ms, at.speed_mps);
+            }
+            let is_sure = at.may.iter().flatten().count() == 1;
+            for (stretch, place) in at.may.iter().flatten() {
+                if look.watched.contains(place) {
+                    let driven = watcher.truth.stretches.entry(*stretch).or_default();
+                    driven.may_ms += apart_ms;
+                    driven.sure_ms += if is_sure { apart_ms } else { 0 };
+                }
             }
         }
         for turn in &self.turned[watcher.turned_from.min(turned)..] {
@@ -355,18 +365,20 @@ fn check_told((uav, now_ms): (u16, u64), told: &Usages, truth: &Seen, found: &mu
         let is = truth.stretches.get(&n).copied().unwrap_or_default();
         says_s += says.spent_s();
         watched += says.watched_s(edge.length_m) * edge.length_m;
-        let off_s = (says.spent_s() - is.spent_s()).abs();
-        if off_s > STRETCH_OFF_S + STRETCH_OFF_SHARE * is.spent_s() {
+        let (sure_s, may_s) = (secs(is.sure_ms), secs(is.may_ms));
+        let least_s = (1.0 - STRETCH_OFF_SHARE) * sure_s - STRETCH_OFF_S;
+        let most_s = (1.0 + STRETCH_OFF_SHARE) * may_s + STRETCH_OFF_S;
+        if !(least_s..=most_s).contains(&says.spent_s()) {
             found.broken("usage", now_ms, Some(uav), || {
                 format!(
-                    "tells {:.0} s of vehicles on stretch {n}, and they were {:.0} s",
-                    says.spent_s(),
-                    is.spent_s()
+                    "tells {:.0} s of vehicles on stretch {n}, and they were {sure_s:.0} to {may_s:.0} s",
+                    says.spent_s()
                 )
             });
         }
         if let (Some(v), Some(truly)) = (says.speed_mps(), is.speed_mps())
             && is.spent_s() >= SPEED_FROM_S
+            && sure_s >= SPEED_SURE_SHARE * may_s
             && (v - truly).abs() > SPEED_OFF_MPS + SPEED_OFF_SHARE * truly
         {
             found.broken("usage", now_ms, Some(uav), || {

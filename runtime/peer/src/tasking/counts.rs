@@ -1,9 +1,9 @@
-//! When a UAV counts at the sites of its mission, and when it tells of that (D2.7 §3.1). What
-//! counts is [`crate::counting`]'s.
+//! When a UAV counts at the sites of its mission and on its streets, and when it tells of that
+//! (D2.7 §3.1). What counts is [`crate::counting`]'s and [`crate::usage`]'s.
 //!
 //! | what holds | it counts |
 //! |---|---|
-//! | its mission has sites, and is not over for it | in each look |
+//! | its mission has sites or streets, and is not over for it | in each look |
 //! | the mission is over or cancelled, or another process speaks under its id | no more; what it counted it tells |
 
 use super::Tasking;

@@ -14,6 +14,10 @@ use std::sync::Arc;
 const UNLIKE_SHARE: f64 = 0.35;
 const UNLIKE_MPS: f64 = 0.5;
 
+/// Vehicles come in platoons, and some come into view twice: so many of those that were seen tell
+/// as much as one that comes alone.
+const ALIKE: u32 = 2;
+
 /// What all authors together saw of a stretch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StretchSum {
@@ -84,18 +88,18 @@ impl StretchSum {
         (self.watched_m_s > 0).then(|| float(self.stood_ds) / 10.0 / watched_s)
     }
 
-    /// Where the density is in nineteen cases of twenty, vehicles a kilometre, if vehicles come
-    /// independently of each other and one that is seen takes as long as the others did; where
-    /// none was, as long as half of the stretch at this speed, m/s.
+    /// Where the density is in nineteen cases of twenty, vehicles a kilometre, if pairs of vehicles
+    /// come independently of each other and one that is seen takes as long as the others did;
+    /// where none was, as long as half of the stretch at this speed, m/s.
     #[must_use]
     pub fn density_range_per_km(&self, length_m: f64, usual_mps: f64) -> Option<(f64, f64)> {
-        let n = f64::from(self.vehicles);
-        let each_s = if self.vehicles > 0 {
-            self.spent_s() / n
+        let n = self.vehicles.div_ceil(ALIKE);
+        let each_s = if n > 0 {
+            self.spent_s() / f64::from(n)
         } else {
             length_m / 2.0 / usual_mps.max(0.1)
         };
-        let (low, high) = poisson_range(self.vehicles);
+        let (low, high) = poisson_range(n);
         let per_km = |n: f64| 1_000.0 * n * each_s / float(self.watched_m_s);
         (self.watched_m_s > 0).then(|| (per_km(low), per_km(high)))
     }
@@ -105,7 +109,7 @@ impl StretchSum {
     #[must_use]
     pub fn speed_range_mps(&self) -> Option<(f64, f64)> {
         let v = self.speed_mps()?;
-        let off = 1.96 * (UNLIKE_SHARE * v + UNLIKE_MPS) / f64::from(self.vehicles.max(1)).sqrt();
+        let off = 1.96 * (UNLIKE_SHARE * v + UNLIKE_MPS) / f64::from(self.vehicles.div_ceil(ALIKE).max(1)).sqrt();
         Some(((v - off).max(0.0), v + off))
     }
 }

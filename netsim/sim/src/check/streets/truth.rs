@@ -8,6 +8,10 @@ use std::collections::BTreeMap;
 /// Farther from a middle line nobody is on its street, metres.
 const ASIDE_M: f64 = 12.0;
 
+/// Who is seen two or three metres beside its place may be taken to be on another stretch that is
+/// no farther than this beyond the nearest one, metres.
+const MAY_M: f64 = 7.0;
+
 /// Of stretches that are about as near that counts along which a vehicle drives, metres.
 const ALIKE_M: f64 = 5.0;
 
@@ -19,6 +23,10 @@ const WELL_ON_M: f64 = 15.0;
 pub struct Driven {
     spent_ms: u64,
     driven_m: f64,
+    /// How long were those who may be taken to be on it, and those who can be taken to be nowhere
+    /// else.
+    pub may_ms: u64,
+    pub sure_ms: u64,
 }
 
 impl Driven {
@@ -49,11 +57,16 @@ pub struct Seen {
     pub stretches: BTreeMap<u16, Driven>,
 }
 
+/// So many stretches are near a place at most.
+const MAY: usize = 6;
+
 /// Where one vehicle is.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Located {
     /// On which stretch, at which of its places.
     pub on: Option<(u16, usize)>,
+    /// Where it may be taken to be.
+    pub may: [Option<(u16, usize)>; MAY],
     /// How fast, m/s.
     pub speed_mps: f64,
     well: Option<u16>,
@@ -69,10 +82,12 @@ impl Located {
     ) -> Option<Turn> {
         let moved = at - before;
         self.speed_mps = moved.norm() / secs(apart_ms.max(1));
-        let found = locate(network, at, moved);
-        self.on = found.and_then(|(stretch, along_m)| {
+        let (found, may) = locate(network, at, moved);
+        let place = |(stretch, along_m): (u16, f64)| {
             Some((stretch, network.place_along(stretch, along_m)?))
-        });
+        };
+        self.on = found.and_then(place);
+        self.may = may.map(|m| m.and_then(place));
         let (stretch, along_m) = found?;
         let length_m = network.edges().get(usize::from(stretch))?.length_m;
         if along_m.min(length_m - along_m) < WELL_ON_M.min(length_m / 4.0) {
@@ -89,8 +104,11 @@ impl Located {
     }
 }
 
-/// On which stretch a vehicle is that moved so, and how far along it, metres.
-pub fn locate(network: &Network, at: Point, moved: Vector) -> Option<(u16, f64)> {
+/// A stretch, and how far along it, metres.
+type On = Option<(u16, f64)>;
+
+/// On which stretch a vehicle is that moved so, and on which ones it may be taken to be.
+fn locate(network: &Network, at: Point, moved: Vector) -> (On, [On; MAY]) {
     // The nearest place of each stretch that is near enough.
     let mut near: Vec<(f64, f64, u16, f64)> = Vec::new();
     for (n, edge) in (0_u16..).zip(network.edges()) {
@@ -101,7 +119,7 @@ pub fn locate(network: &Network, at: Point, moved: Vector) -> Option<(u16, f64)>
             let length_m = line.norm();
             let along_m = (line.dot(&to) / length_m).clamp(0.0, length_m);
             let aside_m = (to - line * (along_m / length_m)).norm();
-            if aside_m <= ASIDE_M && best.is_none_or(|b| aside_m < b.0) {
+            if aside_m <= ASIDE_M + MAY_M && best.is_none_or(|b| aside_m < b.0) {
                 let speed = moved.norm();
                 let across = if speed > 0.0 {
                     (line.perp(&moved) / (length_m * speed)).abs()
@@ -115,9 +133,16 @@ pub fn locate(network: &Network, at: Point, moved: Vector) -> Option<(u16, f64)>
         near.extend(best);
     }
     let least_m = near.iter().map(|n| n.0).fold(f64::INFINITY, f64::min);
-    near.retain(|n| n.0 <= least_m + ALIKE_M);
+    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut may = [None; MAY];
+    let all = near.iter().filter(|n| n.0 <= least_m + MAY_M);
+    for (slot, (_, _, stretch, along_m)) in may.iter_mut().zip(all) {
+        *slot = Some((*stretch, *along_m));
+    }
+    near.retain(|n| n.0 <= ASIDE_M && n.0 <= least_m + ALIKE_M);
     let of = near
         .iter()
         .min_by(|a, b| (a.0 + 12.0 * a.1).total_cmp(&(b.0 + 12.0 * b.1)));
-    of.map(|(_, _, stretch, along_m)| (*stretch, *along_m))
+    let on = of.map(|(_, _, stretch, along_m)| (*stretch, *along_m));
+    (on, may)
 }
