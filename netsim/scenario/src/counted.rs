@@ -86,13 +86,25 @@ fn streets_are_measured_and_hinted_by_one_uav_and_by_many() {
         // The ground station knows of each street.
         assert_eq!(told.watched.0, told.stretches, "{:?}", told.lines());
         let (hold, of) = told.density_holds;
-        assert!(of >= 60 && f64::from(hold) >= 0.8 * f64::from(of), "{told:?}");
+        assert!(
+            of >= 60 && f64::from(hold) >= 0.8 * f64::from(of),
+            "{told:?}"
+        );
         let (hold, of) = told.speed_holds;
-        assert!(of >= 20 && f64::from(hold) >= 0.8 * f64::from(of), "{told:?}");
-        assert!(told.turns > 20 && told.turns_wrong * 5 < told.turns, "{told:?}");
+        assert!(
+            of >= 20 && f64::from(hold) >= 0.8 * f64::from(of),
+            "{told:?}"
+        );
+        assert!(
+            told.turns > 20 && told.turns_wrong * 5 < told.turns,
+            "{told:?}"
+        );
         // Round the jam, through which the shortest way leads.
         let hint = &told.hints[0];
-        assert!(hint.told.contains("Pohjoisesplanadi is blocked"), "{hint:?}");
+        assert!(
+            hint.told.contains("Pohjoisesplanadi is blocked"),
+            "{hint:?}"
+        );
         assert!(hint.true_s * 2.0 < hint.shortest_s, "{}", hint.line());
         assert!(told.hints.iter().all(|h| h.true_s < 1.3 * h.best_s + 20.0));
     }

@@ -50,7 +50,7 @@ pub mod world;
 pub use check::Findings;
 pub use check::contours::{ContourCheck, ContourReport};
 pub use check::counts::CountReport;
-pub use check::streets::{HintReport, StreetsReport};
 pub use check::detections::{DetectionCheck, DetectionReport, Truth};
+pub use check::streets::{HintReport, StreetsReport};
 pub use geometry_cache::geometry_of;
 pub use prepared::Prepared;

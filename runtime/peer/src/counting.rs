@@ -565,11 +565,7 @@ pub(crate) fn carried<T>(
 
 /// Where others are now, if they flew straight on since they said where they were; who was not
 /// heard lately is left out. They are taken to have the own airframe.
-pub(crate) fn flown_on(
-    others: &[(Pose, u64)],
-    interval_ms: u64,
-    airframe: &Airframe,
-) -> Vec<Pose> {
+pub(crate) fn flown_on(others: &[(Pose, u64)], interval_ms: u64, airframe: &Airframe) -> Vec<Pose> {
     let fresh = others
         .iter()
         .filter(|(_, age_ms)| *age_ms <= HEARD_INTERVALS * interval_ms);

@@ -25,8 +25,8 @@ use crate::mission::Mission;
 use crate::streets::Streets;
 use crate::wire::codec::Body;
 use crate::wire::usage::{
-    INTERVALS_MAX, MOST, STRETCHES_MAX, StretchUse, TURNS_MAX, TurnUse, Usage,
-    interval_of, subject_of_stretch, subject_of_turn,
+    INTERVALS_MAX, MOST, STRETCHES_MAX, StretchUse, TURNS_MAX, TurnUse, Usage, interval_of,
+    subject_of_stretch, subject_of_turn,
 };
 use skein_behaviors::Percept;
 use skein_flight::airframe::Airframe;
@@ -289,7 +289,11 @@ impl Using {
         own.spent_ms += apart_ms;
         own.stood_ms += if stands { apart_ms } else { 0 };
         // Of who stands, errors of its place to and fro are no way that was driven.
-        own.driven_m += if stands { 0.0 } else { velocity.norm() * seconds(apart_ms) };
+        own.driven_m += if stands {
+            0.0
+        } else {
+            velocity.norm() * seconds(apart_ms)
+        };
     }
 
     /// One that was well on a stretch is well on another one.

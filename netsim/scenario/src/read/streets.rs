@@ -36,7 +36,8 @@ impl Lines {
         if known.is_none() {
             self.names.push(name.to_owned());
         }
-        self.all.push((u16::try_from(number).unwrap_or(u16::MAX), way));
+        self.all
+            .push((u16::try_from(number).unwrap_or(u16::MAX), way));
     }
 
     /// Those that hang together, joined and thinned, with the names that are left.
@@ -201,11 +202,17 @@ mod tests {
         let town = with("{ file: '../data/helsinki_roads.geojson' }");
         // The default area is larger than a mission's streets may be.
         let said = town.map(|m| m.streets.as_ref().map(|s| s.network().edges().len()));
-        assert!(said.as_ref().is_ok_and(|n| n.is_some_and(|n| n > 30)) || said.is_err_and(|e| e.contains("take a smaller part")));
+        assert!(
+            said.as_ref().is_ok_and(|n| n.is_some_and(|n| n > 30))
+                || said.is_err_and(|e| e.contains("take a smaller part"))
+        );
         for (streets, why) in [
             ("{ }".to_owned(), "expected either file"),
             ("{ ways_m: [[[0, 0]]] }".to_owned(), "ways_m[0]"),
-            ("{ ways_m: [[[0, 0], [5, 0]]] }".to_owned(), "none is 25 m long"),
+            (
+                "{ ways_m: [[[0, 0], [5, 0]]] }".to_owned(),
+                "none is 25 m long",
+            ),
             (format!("{{ {ways}, interval_s: 3 }}"), "interval_s"),
             (format!("{{ {ways}, usual_mps: 0.2 }}"), "usual_mps"),
             (
@@ -213,11 +220,19 @@ mod tests {
                 "150 m",
             ),
             (
-                format!("{{ {ways}, asked: [{{ name: 'x', from: {{ east_m: 0, north_m: 0 }} }}] }}"),
+                format!(
+                    "{{ {ways}, asked: [{{ name: 'x', from: {{ east_m: 0, north_m: 0 }} }}] }}"
+                ),
                 "to",
             ),
-            (format!("{{ {ways}, names: ['a', 'b', 'c', 'd'] }}"), "a way for each name"),
-            ("{ file: 'none.geojson' }".to_owned(), "cannot read none.geojson"),
+            (
+                format!("{{ {ways}, names: ['a', 'b', 'c', 'd'] }}"),
+                "a way for each name",
+            ),
+            (
+                "{ file: 'none.geojson' }".to_owned(),
+                "cannot read none.geojson",
+            ),
         ] {
             let said = with(&streets).unwrap_err();
             assert!(said.contains(why), "{said}");

@@ -38,8 +38,8 @@ pub use work::Held;
 
 use crate::check::contours::ContourReport;
 use crate::check::counts::CountReport;
-use crate::check::streets::StreetsReport;
 use crate::check::detections::DetectionReport;
+use crate::check::streets::StreetsReport;
 pub use crate::check::tracks::Tracked;
 use crate::world::{Fact, Judge, Loss};
 use connectivity::Connectivity;

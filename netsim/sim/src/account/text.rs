@@ -1,9 +1,9 @@
 //! The report of a run for a person.
 
-use crate::check::streets::StreetsReport;
 use super::lifetimes::Cause;
 use super::report::{Driver, KillReport, RestartReport, RunReport};
 use super::secs;
+use crate::check::streets::StreetsReport;
 use std::collections::BTreeMap;
 use std::fmt;
 

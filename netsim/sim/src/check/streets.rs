@@ -25,8 +25,8 @@ use std::sync::Arc;
 
 mod truth;
 mod ways;
-pub use ways::{HintReport, StreetsReport};
 use truth::{Driven, Located, Seen};
+pub use ways::{HintReport, StreetsReport};
 
 /// The time that a UAV counted in one life is off by no more than this, seconds, and this share;
 /// and at one stretch by so much from those who may be taken to be there.
@@ -198,12 +198,11 @@ impl StreetCheck {
                 let driven = watcher.truth.stretches.entry(stretch).or_default();
                 driven.add(apart_ms, at.speed_mps);
             }
-            let is_sure = at.may.iter().flatten().count() == 1;
             for (stretch, place) in at.may.iter().flatten() {
                 if look.watched.contains(place) {
                     let driven = watcher.truth.stretches.entry(*stretch).or_default();
                     driven.may_ms += apart_ms;
-                    driven.sure_ms += if is_sure { apart_ms } else { 0 };
+                    driven.sure_ms += if at.is_sure { apart_ms } else { 0 };
                 }
             }
         }
@@ -222,12 +221,7 @@ impl StreetCheck {
     }
 
     /// What all vehicles do, whoever looks.
-    fn note_all(
-        &mut self,
-        now_ms: u64,
-        truth: &[Point],
-        (streets, network): (&Streets, &Network),
-    ) {
+    fn note_all(&mut self, now_ms: u64, truth: &[Point], (streets, network): (&Streets, &Network)) {
         let apart_ms = now_ms.saturating_sub(self.now_ms);
         let is_first = self.places.len() != truth.len();
         if is_first {

@@ -31,8 +31,8 @@ mod operator;
 pub mod outcome;
 mod queue;
 mod sim_peer;
-mod streets;
 pub(crate) mod stream;
+mod streets;
 mod traffic;
 
 pub use outcome::Outcome;

@@ -77,9 +77,8 @@ impl Swarm {
         let running = |p: &&SimPeer| p.process == Process::Running;
         let minds = self.peers.iter().filter(running);
         let minds = minds.filter_map(|p| p.peer.as_ref());
-        let known = minds.filter_map(|mind| {
-            Some((mind.is_ground_station(), mind.usages()?, mind.hints()))
-        });
+        let known =
+            minds.filter_map(|mind| Some((mind.is_ground_station(), mind.usages()?, mind.hints())));
         let best = known.max_by_key(|(ground, usages, _)| (*ground, usages.watched_m_s()));
         let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
         if let Some((_, usages, hints)) = best {

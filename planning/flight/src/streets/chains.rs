@@ -70,7 +70,11 @@ fn thinned(way: &[Point]) -> Vec<Point> {
         let share = (along.dot(&(p - first)) / (length_m * length_m)).clamp(0.0, 1.0);
         (first + along * share - p).norm()
     };
-    let inner = way.iter().enumerate().skip(1).take(way.len().saturating_sub(2));
+    let inner = way
+        .iter()
+        .enumerate()
+        .skip(1)
+        .take(way.len().saturating_sub(2));
     let farthest = inner.max_by(|a, b| off(a.1).total_cmp(&off(b.1)));
     match farthest.filter(|(_, p)| off(p) > THINNED_M) {
         None => vec![*first, *last],
@@ -91,7 +95,10 @@ mod tests {
     fn the_largest_part_is_kept_and_thinned() {
         let p = Point::new;
         let lines = vec![
-            (0, vec![p(0.0, 0.0), p(50.0, 0.4), p(100.0, 0.0), p(150.0, 40.0)]),
+            (
+                0,
+                vec![p(0.0, 0.0), p(50.0, 0.4), p(100.0, 0.0), p(150.0, 40.0)],
+            ),
             (1, vec![p(100.0, -80.0), p(100.0, 0.0), p(100.0, 90.0)]),
             (2, vec![p(900.0, 0.0), p(960.0, 0.0)]),
         ];

@@ -242,7 +242,9 @@ impl Network {
         // A group is where the middle of its members is, if a stretch ends there.
         let mut sums: BTreeMap<Key, (Point, f64)> = BTreeMap::new();
         for k in &members {
-            let (sum, n) = sums.entry(groups.find(*k)).or_insert((Point::origin(), 0.0));
+            let (sum, n) = sums
+                .entry(groups.find(*k))
+                .or_insert((Point::origin(), 0.0));
             *sum += graph.places[k].coords;
             *n += 1.0;
         }
@@ -319,7 +321,9 @@ impl Network {
     /// The stretches that end at a crossing.
     #[must_use]
     pub fn at(&self, crossing: u16) -> &[u16] {
-        self.at.get(usize::from(crossing)).map_or(&[], Vec::as_slice)
+        self.at
+            .get(usize::from(crossing))
+            .map_or(&[], Vec::as_slice)
     }
 
     /// The ways over crossings of three stretches or more, ascending: their place is their number.
@@ -435,12 +439,20 @@ pub(super) mod tests {
             (0, vec![p(0.0, 12.0), p(200.0, 12.0), p(400.0, 12.0)]),
             (
                 1,
-                vec![p(200.0, -150.0), p(200.0, 0.0), p(200.0, 12.0), p(200.0, 150.0)],
+                vec![
+                    p(200.0, -150.0),
+                    p(200.0, 0.0),
+                    p(200.0, 12.0),
+                    p(200.0, 150.0),
+                ],
             ),
         ];
         let net = Network::of(&lines);
         assert_eq!(net.edges().len(), 6);
-        let middle = net.crossings().iter().filter(|c| c.x > 150.0 && c.x < 250.0);
+        let middle = net
+            .crossings()
+            .iter()
+            .filter(|c| c.x > 150.0 && c.x < 250.0);
         let middle: Vec<&Point> = middle.filter(|c| c.y.abs() < 50.0).collect();
         assert_eq!(middle.len(), 1);
         assert!((middle[0].y - 6.0).abs() < 1e-9);

@@ -182,11 +182,23 @@ mod tests {
         assert!((line[0] - from).norm() < 1e-9 && (line[line.len() - 1] - to).norm() < 1e-9);
         let slow: Vec<u16> = even.iter().map(|l| l.edge).collect();
         let round = net
-            .quickest(from, to, &|e| if slow[1..slow.len() - 1].contains(&e) { 2.0 } else { 0.1 })
+            .quickest(from, to, &|e| {
+                if slow[1..slow.len() - 1].contains(&e) {
+                    2.0
+                } else {
+                    0.1
+                }
+            })
             .unwrap();
-        assert!(!round.iter().any(|l| slow[1..slow.len() - 1].contains(&l.edge)));
+        assert!(
+            !round
+                .iter()
+                .any(|l| slow[1..slow.len() - 1].contains(&l.edge))
+        );
         assert!(net.quickest(Point::new(900.0, 0.0), to, &|_| 0.1).is_none());
-        let near = net.quickest(from, Point::new(0.0, 180.0), &|_| 0.1).unwrap();
+        let near = net
+            .quickest(from, Point::new(0.0, 180.0), &|_| 0.1)
+            .unwrap();
         assert!(near.len() == 1 && (near[0].length_m() - 30.0).abs() < 1e-9);
     }
 

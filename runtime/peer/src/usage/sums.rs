@@ -109,7 +109,8 @@ impl StretchSum {
     #[must_use]
     pub fn speed_range_mps(&self) -> Option<(f64, f64)> {
         let v = self.speed_mps()?;
-        let off = 1.96 * (UNLIKE_SHARE * v + UNLIKE_MPS) / f64::from(self.vehicles.div_ceil(ALIKE).max(1)).sqrt();
+        let off = 1.96 * (UNLIKE_SHARE * v + UNLIKE_MPS)
+            / f64::from(self.vehicles.div_ceil(ALIKE).max(1)).sqrt();
         Some(((v - off).max(0.0), v + off))
     }
 }
@@ -269,7 +270,10 @@ impl Usages {
                 .map(|(to, n)| format!("{n} to {}", called(*to)))
                 .collect::<Vec<_>>();
             let from = called(*from);
-            format!("of {all} from {from} over crossing {over} {}", each.join(", "))
+            format!(
+                "of {all} from {from} over crossing {over} {}",
+                each.join(", ")
+            )
         };
         by.iter().map(one).collect()
     }

@@ -113,7 +113,11 @@ fn time_and_way_on_what_is_watched_give_density_speed_and_flow() {
 #[test]
 fn who_stands_is_told_apart_and_blocks_a_street() {
     let mut scene = Scene::new(Point::new(100.0, 100.0));
-    let jam = |_: f64| (0..5).map(|i| Point::new(80.0 + 9.0 * f64::from(i), 100.0)).collect();
+    let jam = |_: f64| {
+        (0..5)
+            .map(|i| Point::new(80.0 + 9.0 * f64::from(i), 100.0))
+            .collect()
+    };
     scene.look(30.0, &jam);
     let own = scene.own();
     let stretch = middle(&own);
@@ -148,7 +152,9 @@ fn a_turn_is_counted_where_its_crossing_is_in_the_picture() {
 #[test]
 fn of_two_above_a_street_one_counts() {
     let mut scene = Scene::new(Point::new(100.0, 100.0));
-    scene.using.heed(vec![Pose::new(Point::new(102.0, 100.0), 0.0)]);
+    scene
+        .using
+        .heed(vec![Pose::new(Point::new(102.0, 100.0), 0.0)]);
     scene.look(20.0, &drives);
     let own = scene.own();
     assert!(own.of_stretch(middle(&own)).watched_m_s < 200, "{own:?}");

@@ -119,7 +119,10 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         Body::Count(super::count::samples::count()),
         "871a123456781a00013df80e19ee481910d60000",
     ));
-    all.push((Body::Usage(super::usage::samples::usage()), "831a1234567882861119072618d60018a30486131907260000000080"));
+    all.push((
+        Body::Usage(super::usage::samples::usage()),
+        "831a1234567882861119072618d60018a30486131907260000000080",
+    ));
     all
 }
 

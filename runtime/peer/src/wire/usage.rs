@@ -150,7 +150,10 @@ pub(super) fn check(u: &Usage) -> Result<(), WireError> {
     in_range("driven_m", all(|s| s.driven_m <= MOST))?;
     in_range("turn", u.turns.iter().all(|t| t.turn < TURNS_MAX))?;
     let ascends = u.turns.windows(2).all(|w| w[0].turn < w[1].turn);
-    in_range("turns", ascends && (u.turns.is_empty() || u.stretches.is_empty()))
+    in_range(
+        "turns",
+        ascends && (u.turns.is_empty() || u.stretches.is_empty()),
+    )
 }
 
 const NUMBER: Shape = Shape::Number(0, MOST as i128);

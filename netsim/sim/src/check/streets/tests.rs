@@ -16,7 +16,15 @@ fn streets() -> Streets {
         ways: vec![
             way(0, &[(0, 100_000), (0, 0), (200_000, 0), (200_000, 100_000)]),
             way(1, &[(0, 100_000), (200_000, 100_000)]),
-            way(2, &[(0, 100_000), (0, 200_000), (200_000, 200_000), (200_000, 100_000)]),
+            way(
+                2,
+                &[
+                    (0, 100_000),
+                    (0, 200_000),
+                    (200_000, 200_000),
+                    (200_000, 100_000),
+                ],
+            ),
         ],
         interval_s: 60,
         usual_dmps: 80,
@@ -186,7 +194,11 @@ fn a_hint_that_is_no_way_or_a_slow_one_breaks_the_rule() {
         match case {
             // Round by the north, though nothing is in the way.
             1 => {
-                let long = scene.network.edges().iter().position(|e| e.length_m > 250.0);
+                let long = scene
+                    .network
+                    .edges()
+                    .iter()
+                    .position(|e| e.length_m > 250.0);
                 let long = u16::try_from(long.unwrap()).unwrap();
                 hint.legs = vec![(long, 0.0, 400.0)];
             }
@@ -195,7 +207,9 @@ fn a_hint_that_is_no_way_or_a_slow_one_breaks_the_rule() {
             _ => {}
         }
         // By the truth it takes 50 s where 20 s are enough: more than the bound.
-        scene.check.on_known(91_000, told, &[hint], &mut scene.found);
+        scene
+            .check
+            .on_known(91_000, told, &[hint], &mut scene.found);
         assert_eq!(!scene.found.counts.is_empty(), broken, "{case}");
     }
 }

@@ -12,6 +12,10 @@ const ASIDE_M: f64 = 12.0;
 /// no farther than this beyond the nearest one, metres.
 const MAY_M: f64 = 7.0;
 
+/// Who is within a crossing, farther from all stretches than this, may as well be taken to be on
+/// none, metres.
+const SURE_M: f64 = 7.0;
+
 /// Of stretches that are about as near that counts along which a vehicle drives, metres.
 const ALIKE_M: f64 = 5.0;
 
@@ -67,6 +71,8 @@ pub struct Located {
     pub on: Option<(u16, usize)>,
     /// Where it may be taken to be.
     pub may: [Option<(u16, usize)>; MAY],
+    /// Whether it can be taken to be nowhere else.
+    pub is_sure: bool,
     /// How fast, m/s.
     pub speed_mps: f64,
     well: Option<u16>,
@@ -82,12 +88,13 @@ impl Located {
     ) -> Option<Turn> {
         let moved = at - before;
         self.speed_mps = moved.norm() / secs(apart_ms.max(1));
-        let (found, may) = locate(network, at, moved);
+        let (found, may, least_m) = locate(network, at, moved);
         let place = |(stretch, along_m): (u16, f64)| {
             Some((stretch, network.place_along(stretch, along_m)?))
         };
         self.on = found.and_then(place);
         self.may = may.map(|m| m.and_then(place));
+        self.is_sure = least_m <= SURE_M && self.may.iter().flatten().count() == 1;
         let (stretch, along_m) = found?;
         let length_m = network.edges().get(usize::from(stretch))?.length_m;
         if along_m.min(length_m - along_m) < WELL_ON_M.min(length_m / 4.0) {
@@ -107,8 +114,9 @@ impl Located {
 /// A stretch, and how far along it, metres.
 type On = Option<(u16, f64)>;
 
-/// On which stretch a vehicle is that moved so, and on which ones it may be taken to be.
-fn locate(network: &Network, at: Point, moved: Vector) -> (On, [On; MAY]) {
+/// On which stretch a vehicle is that moved so, on which ones it may be taken to be, and how far
+/// the nearest is, metres.
+fn locate(network: &Network, at: Point, moved: Vector) -> (On, [On; MAY], f64) {
     // The nearest place of each stretch that is near enough.
     let mut near: Vec<(f64, f64, u16, f64)> = Vec::new();
     for (n, edge) in (0_u16..).zip(network.edges()) {
@@ -144,5 +152,5 @@ fn locate(network: &Network, at: Point, moved: Vector) -> (On, [On; MAY]) {
         .iter()
         .min_by(|a, b| (a.0 + 12.0 * a.1).total_cmp(&(b.0 + 12.0 * b.1)));
     let on = of.map(|(_, _, stretch, along_m)| (*stretch, *along_m));
-    (on, may)
+    (on, may, least_m)
 }
