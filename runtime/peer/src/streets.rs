@@ -267,7 +267,8 @@ pub(crate) mod tests {
     fn what_is_wrong_is_named_with_its_place() {
         assert_eq!(block().check(), Ok(()));
         assert_eq!(block().network().edges().len(), 3);
-        let cases: [(fn(&mut Streets), &str); 9] = [
+        type Change = fn(&mut Streets);
+        let cases: [(Change, &str); 9] = [
             (|s| s.names[1].clear(), "names[1]"),
             (|s| s.ways[2].street = 5, "ways[2]"),
             (|s| s.ways[3].places.truncate(1), "ways[3]"),

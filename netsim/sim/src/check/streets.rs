@@ -43,9 +43,11 @@ const SPEED_OFF_SHARE: f64 = 0.2;
 const SPEED_FROM_S: f64 = 30.0;
 const SPEED_SURE_SHARE: f64 = 0.5;
 
-/// What was watched by no more than this share, and so many metres times seconds.
+/// What was watched by no more than this share, and so many metres times seconds: a UAV watches
+/// from its first look on, and the judge from when it speaks in its life, up to five seconds later;
+/// a picture holds up to 300 m of streets.
 const WATCHED_OFF_SHARE: f64 = 0.03;
-const WATCHED_OFF_M_S: f64 = 200.0;
+const WATCHED_OFF_M_S: f64 = 1_500.0;
 
 /// Well in the picture is what is in so much of half of it, each way; for so much of the time that
 /// places are well in a picture somebody watches, less some.
@@ -104,7 +106,7 @@ pub struct StreetCheck {
     places: Vec<Point>,
     located: Vec<Located>,
     /// What truly drove, by interval and stretch.
-    all: BTreeMap<(u16, u16), Driven>,
+    all: ways::ByInterval,
     /// For how long each interval was looked at, milliseconds.
     lasted_ms: BTreeMap<u16, u64>,
     /// All turns that were taken, in their order, and how often each.

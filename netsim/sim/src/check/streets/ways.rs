@@ -31,6 +31,9 @@ const HINT_OFF_S: f64 = 20.0;
 /// That is asked for where each stretch of both ways was watched for so long, seconds.
 const WATCHED_FROM_S: f64 = 15.0;
 
+/// What truly drove, by interval and stretch.
+pub(super) type ByInterval = BTreeMap<(u16, u16), Driven>;
+
 /// A hinted way beside the best one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HintReport {
@@ -116,7 +119,7 @@ impl StreetsReport {
     pub(super) fn compare(
         &mut self,
         known: &Usages,
-        (all, lasted_ms): (&BTreeMap<(u16, u16), Driven>, &BTreeMap<u16, u64>),
+        (all, lasted_ms): (&ByInterval, &BTreeMap<u16, u64>),
         (network, usual_mps): (&Network, f64),
     ) {
         let (mut squares, mut truly, mut n) = (0.0, 0.0, 0.0);
