@@ -71,11 +71,12 @@ impl Scene {
         near.map(|(i, _)| i).collect()
     }
 
-    /// Looks five times a second; a car drives along the middle at 10 m/s, over and over.
+    /// Looks five times a second; a car drives along the middle at 10 m/s, to and fro.
     fn look(&mut self, for_s: u32, watched: &BTreeSet<usize>) {
         for look in 0..5 * for_s {
             let s = f64::from(look) / 5.0;
-            let car = Point::new(10.0 * (s % 20.0), 100.0);
+            // To and fro.
+            let car = Point::new(200.0 - 10.0 * (s % 40.0 - 20.0).abs(), 100.0);
             let look = StreetLook {
                 uav: (1, 1),
                 pose: Pose::new(Point::new(100.0, 100.0), 0.0),
