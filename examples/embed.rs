@@ -77,6 +77,7 @@ fn mission() -> Mission {
         detections: Vec::new(),
         tasks: Vec::new(),
         counts: Vec::new(),
+        streets: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

@@ -305,6 +305,12 @@ fn words(author: u16, body: &Body) -> String {
             c.watched_ms as f64 / 1000.0,
             c.standing
         ),
+        Body::Usage(u) => format!(
+            "saw {} stretches of streets used for {} vehicle-seconds, and {} turns",
+            u.stretches.len(),
+            u.stretches.iter().map(|s| s.spent_ds / 10).sum::<u32>(),
+            u.turns.iter().map(|t| u32::from(t.vehicles)).sum::<u32>()
+        ),
         Body::Trail(t) => format!(
             "tells {} places of a contour, the first seen at {} ms of the clock of percepts",
             t.places.len(),

@@ -26,6 +26,8 @@ pub struct LineTarget {
     pub pointer: String,
     /// At least two points.
     pub way: Vec<LatLon>,
+    /// What it is called, if the file says so.
+    pub name: Option<String>,
     /// Width of the strip around it that must be seen, metres; 0 for the line alone.
     pub width_m: f64,
     /// The sensor that it is to be seen with, if the file says so.
@@ -51,7 +53,7 @@ const WIDEST_M: f64 = 40_000.0;
 /// Reads the points and lines of a QGroundControl plan or of GeoJSON.
 ///
 /// In a plan, waypoints are points and corridor scans are lines of their width. In
-/// GeoJSON the properties `radius_m` of a point, `width_m` of a line and `sensor` of both
+/// GeoJSON the properties `radius_m` of a point, `width_m` and `name` of a line and `sensor` of both
 /// are read.
 ///
 /// # Errors
@@ -127,6 +129,7 @@ fn of_plan(root: &Node<'_>) -> Result<Targets, Error> {
 struct Asked {
     radius_m: f64,
     width_m: f64,
+    name: Option<String>,
     sensor: Option<String>,
 }
 
@@ -150,6 +153,7 @@ fn push_line(
     out.lines.push(LineTarget {
         pointer: pointer.to_owned(),
         way,
+        name: asked.name.clone(),
         width_m: asked.width_m,
         sensor: asked.sensor.clone(),
     });
@@ -172,6 +176,11 @@ fn feature(at: &Node<'_>, out: &mut Targets) -> Result<(), Error> {
     let asked = Asked {
         radius_m: size("radius_m")?,
         width_m: size("width_m")?,
+        name: match property("name")? {
+            // Maps write null, or a number, where a street has no name.
+            Some(name) => name.text().ok().map(str::to_owned),
+            None => None,
+        },
         sensor: match property("sensor")? {
             Some(name) => Some(name.text()?.to_owned()),
             None => None,

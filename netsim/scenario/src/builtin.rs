@@ -27,6 +27,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/crossings.json5"),
     ),
     (
+        "streets",
+        "streets.json5",
+        include_str!("../../../configs/trials/streets.json5"),
+    ),
+    (
         "parking",
         "parking.json5",
         include_str!("../../../configs/trials/parking.json5"),

@@ -77,3 +77,35 @@ fn an_accident_is_looked_at_in_time_and_the_others_go_on() {
         assert!(report.counts.iter().all(|s| s.known.passed > 0));
     }
 }
+
+#[test]
+fn streets_are_measured_and_hinted_by_one_uav_and_by_many() {
+    for uavs in [1, 3, 8] {
+        let outcome = flown("streets", uavs, 11);
+        let told = outcome.report.streets.as_ref().unwrap();
+        // The ground station knows of each street.
+        assert_eq!(told.watched.0, told.stretches, "{:?}", told.lines());
+        let (hold, of) = told.density_holds;
+        assert!(
+            of >= 60 && f64::from(hold) >= 0.8 * f64::from(of),
+            "{told:?}"
+        );
+        let (hold, of) = told.speed_holds;
+        assert!(
+            of >= 20 && f64::from(hold) >= 0.8 * f64::from(of),
+            "{told:?}"
+        );
+        assert!(
+            told.turns > 20 && told.turns_wrong * 5 < told.turns,
+            "{told:?}"
+        );
+        // Round the jam, through which the shortest way leads.
+        let hint = &told.hints[0];
+        assert!(
+            hint.told.contains("Pohjoisesplanadi is blocked"),
+            "{hint:?}"
+        );
+        assert!(hint.true_s * 2.0 < hint.shortest_s, "{}", hint.line());
+        assert!(told.hints.iter().all(|h| h.true_s < 1.3 * h.best_s + 20.0));
+    }
+}

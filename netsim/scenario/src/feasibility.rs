@@ -73,6 +73,7 @@ pub(crate) fn blamed(e: &GeometryError) -> &'static str {
         GeometryError::Detections(_) => "mission.detections",
         GeometryError::Tasks(_) => "mission.tasks",
         GeometryError::Counts(_) => "mission.counts",
+        GeometryError::Streets(..) => "mission.streets",
         GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
             "no_fly"
         }

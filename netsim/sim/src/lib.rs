@@ -52,5 +52,6 @@ pub use check::contours::{ContourCheck, ContourReport};
 pub use check::counts::CountReport;
 pub use check::detections::{DetectionCheck, DetectionReport, Truth};
 pub use check::footprint::FootprintErrors;
+pub use check::streets::{HintReport, StreetsReport};
 pub use geometry_cache::geometry_of;
 pub use prepared::Prepared;

@@ -12,6 +12,7 @@
 //! | [`separation`] | promised motions, whether two keep apart, ways round | 1.3 |
 //! | [`tracking`] | following targets: guidance, estimates, hand-over | 3.7 |
 //! | [`tracing`] | following a road or a fire's edge by what is seen of it | 3.1 |
+//! | [`streets`] | networks of streets: where a vehicle is on one, the quickest way | 3.1 |
 //! | [`coverage`] | closed loops over areas, points and lines, and their division among UAVs | 3.4–3.6 |
 //!
 //! ```
@@ -66,6 +67,7 @@ pub mod coverage;
 pub mod mount;
 pub mod route;
 pub mod separation;
+pub mod streets;
 pub mod tracing;
 pub mod tracking;
 pub mod trajectory;

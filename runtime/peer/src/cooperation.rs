@@ -327,7 +327,8 @@ impl Cooperation {
             | Body::Bundle(_)
             | Body::Target(_)
             | Body::Detection(_)
-            | Body::Count(_) => self.tasking.hear(now, record, body),
+            | Body::Count(_)
+            | Body::Usage(_) => self.tasking.hear(now, record, body),
             Body::Trail(trail) => {
                 self.trails.hear(record.author, record.subject, trail);
                 Effects::new()

@@ -38,7 +38,7 @@ use skein_geometry::math::seconds;
 use std::collections::BTreeMap;
 
 /// Looks that are farther apart than this are none of one watch, milliseconds.
-const GAP_MS: u64 = 1_000;
+pub(crate) const GAP_MS: u64 = 1_000;
 
 /// A vehicle left a site when it is so far outside, metres: who stands on the outline passes once.
 const LEFT_M: f64 = 3.0;
@@ -142,21 +142,11 @@ impl SiteCount {
     }
 
     /// Where the volume is, in nineteen cases of twenty, vehicles an hour, if vehicles come
-    /// independently of each other: Byar's approximation of the interval of a Poisson number
-    /// (Breslow and Day 1987).
+    /// independently of each other.
     #[must_use]
     pub fn volume_range_per_h(&self) -> Option<(f64, f64)> {
-        let z = 1.96;
-        let cube = |x: f64| x * x * x;
-        let n = f64::from(self.passed);
-        let low = if self.passed == 0 {
-            0.0
-        } else {
-            n * cube(1.0 - 1.0 / (9.0 * n) - z / (3.0 * n.sqrt()))
-        };
-        let m = n + 1.0;
-        let high = m * cube(1.0 - 1.0 / (9.0 * m) + z / (3.0 * m.sqrt()));
-        Some((self.per_h(low.max(0.0))?, self.per_h(high)?))
+        let (low, high) = poisson_range(self.passed);
+        Some((self.per_h(low)?, self.per_h(high)?))
     }
 
     fn per_h(&self, vehicles: f64) -> Option<f64> {
@@ -386,28 +376,13 @@ impl Counting {
     fn go_along(&mut self, now_ms: u64, tracks: &Tracks, watched: u16) {
         let mut before = core::mem::take(&mut self.tracks);
         for t in tracks.all() {
-            let mut along = Self::before(&mut before, tracks, t).unwrap_or_else(|| Along::begun(t));
+            let known = carried(&mut before, |a: &Along| a.begun_ms, tracks, t);
+            let mut along = known.unwrap_or_else(|| Along::begun(t));
             if t.seen_ms == now_ms {
                 self.step(&mut along, t, now_ms, watched);
             }
             self.tracks.insert(t.name, along);
         }
-    }
-
-    /// What was known of a track, under its name or the one that it had.
-    fn before(
-        before: &mut BTreeMap<TargetName, Along>,
-        tracks: &Tracks,
-        t: &Track,
-    ) -> Option<Along> {
-        if let Some(along) = before.remove(&t.name) {
-            return Some(along);
-        }
-        let begun_ms = t.seen_ms.saturating_sub(t.watched_ms());
-        let gone = |name: &TargetName| !tracks.all().iter().any(|t| t.name == *name);
-        let mut same = before.iter().filter(|(_, a)| a.begun_ms == begun_ms);
-        let name = same.find(|(name, _)| gone(name)).map(|(name, _)| *name)?;
-        before.remove(&name)
     }
 
     fn step(&mut self, along: &mut Along, t: &Track, now_ms: u64, watched: u16) {
@@ -480,21 +455,12 @@ impl Counting {
         }
     }
 
-    /// Where others of lower numbers were, and how long ago they said so, milliseconds: what one
-    /// of them has in its picture, if it flew straight on since, that one counts. They are taken to
-    /// have the own airframe, and to fly level.
-    pub fn heed(&mut self, others: &[(Pose, u64)], interval_ms: u64, airframe: &Airframe) {
-        let fresh = others
-            .iter()
-            .filter(|(_, age_ms)| *age_ms <= HEARD_INTERVALS * interval_ms);
-        let now = |(pose, age_ms): &(Pose, u64)| {
-            let on_m = airframe.cruise_mps * seconds(*age_ms);
-            Pose::new(pose.position() + pose.direction() * on_m, pose.heading_rad)
-        };
-        let poses: Vec<Pose> = fresh.map(now).collect();
+    /// Where others of lower numbers are now: what one of them has in its picture, that one
+    /// counts. They are taken to have the own airframe, and to fly level.
+    pub fn heed(&mut self, others: &[Pose], airframe: &Airframe) {
         for site in &mut self.sites {
             let has = |pose: &Pose| is_in_picture(*pose, airframe, site.outline.vertices());
-            site.is_left_to_another = poses.iter().any(has);
+            site.is_left_to_another = others.iter().any(has);
         }
     }
 
@@ -565,8 +531,55 @@ impl Counting {
     }
 }
 
+/// Where the mean of a Poisson number is, in nineteen cases of twenty, by one drawing: Byar's
+/// approximation (Breslow and Day 1987).
+pub(crate) fn poisson_range(drawn: u32) -> (f64, f64) {
+    let z = 1.96;
+    let cube = |x: f64| x * x * x;
+    let n = f64::from(drawn);
+    let low = if drawn == 0 {
+        0.0
+    } else {
+        n * cube(1.0 - 1.0 / (9.0 * n) - z / (3.0 * n.sqrt()))
+    };
+    let m = n + 1.0;
+    let high = m * cube(1.0 - 1.0 / (9.0 * m) + z / (3.0 * m.sqrt()));
+    (low.max(0.0), high)
+}
+
+/// What was known of a track, under its name or the one that it had; `begun_ms` says when that
+/// track began.
+pub(crate) fn carried<T>(
+    before: &mut BTreeMap<TargetName, T>,
+    begun_ms: fn(&T) -> u64,
+    tracks: &Tracks,
+    t: &Track,
+) -> Option<T> {
+    if let Some(known) = before.remove(&t.name) {
+        return Some(known);
+    }
+    let began_ms = t.seen_ms.saturating_sub(t.watched_ms());
+    let gone = |name: &TargetName| !tracks.all().iter().any(|t| t.name == *name);
+    let mut same = before.iter().filter(|(_, a)| begun_ms(a) == began_ms);
+    let name = same.find(|(name, _)| gone(name)).map(|(name, _)| *name)?;
+    before.remove(&name)
+}
+
+/// Where others are now, if they flew straight on since they said where they were; who was not
+/// heard lately is left out. They are taken to have the own airframe.
+pub(crate) fn flown_on(others: &[(Pose, u64)], interval_ms: u64, airframe: &Airframe) -> Vec<Pose> {
+    let fresh = others
+        .iter()
+        .filter(|(_, age_ms)| *age_ms <= HEARD_INTERVALS * interval_ms);
+    let now = |(pose, age_ms): &(Pose, u64)| {
+        let on_m = airframe.cruise_mps * seconds(*age_ms);
+        Pose::new(pose.position() + pose.direction() * on_m, pose.heading_rad)
+    };
+    fresh.map(now).collect()
+}
+
 /// Whether all of these places are in the inner part of a picture.
-fn is_in_picture(pose: Pose, airframe: &Airframe, places: &[Point]) -> bool {
+pub(crate) fn is_in_picture(pose: Pose, airframe: &Airframe, places: &[Point]) -> bool {
     let forward = pose.direction();
     places.iter().all(|p| {
         let to = *p - pose.position();

@@ -5,6 +5,7 @@ use crate::criteria::{CRITERIA_MAX, Criterion};
 use crate::diagram::{Diagram, DiagramError, Machine, check};
 use crate::input::NewTask;
 use crate::offload::MissionGeometry;
+use crate::streets::Streets;
 use crate::task::CoverageTask;
 use crate::tasking::BROUGHT_MAX;
 use crate::wire::limits::{CHUNK_MAX_BYTES, CHUNKS_MAX};
@@ -102,6 +103,9 @@ pub struct Mission {
     /// Where vehicles are counted; at most [`SITES_MAX`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub counts: Vec<CountSite>,
+    /// The streets whose use is measured, and by which ways are asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub streets: Option<Arc<Streets>>,
 }
 
 /// Whether a field need not be said.
@@ -167,6 +171,9 @@ pub enum GeometryError {
     /// A site at which it counts cannot be counted at.
     #[error("counts: {0}")]
     Counts(String),
+    /// Its streets make no network, or a way that is asked for is not on them.
+    #[error("streets.{0}: {1}")]
+    Streets(String, String),
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -316,6 +323,10 @@ impl Mission {
         if !self.counts.is_empty() {
             h.write_i64(-7);
             self.counts.iter().for_each(|s| s.hash(&mut h));
+        }
+        if let Some(streets) = &self.streets {
+            h.write_i64(-8);
+            streets.hash(&mut h);
         }
         h.finish()
     }
@@ -471,6 +482,15 @@ impl Mission {
         Ok(())
     }
 
+    /// Whether its streets make a network.
+    ///
+    /// # Errors
+    /// [`GeometryError::Streets`] names the place in them and what is wrong.
+    pub fn check_streets(&self) -> Result<(), GeometryError> {
+        let checked = self.streets.as_ref().map_or(Ok(()), |s| s.check());
+        checked.map_err(|(place, text)| GeometryError::Streets(place, text))
+    }
+
     /// Derives the loop and the router.
     ///
     /// # Errors
@@ -479,6 +499,7 @@ impl Mission {
         self.machine()?;
         self.check_detections()?;
         self.check_counts()?;
+        self.check_streets()?;
         if self.tasks.len() > BROUGHT_MAX || self.brought(false).len() < self.tasks.len() {
             let text = format!("at most {BROUGHT_MAX} fit, each as an operator may ask for it");
             return Err(GeometryError::Tasks(text));
@@ -718,6 +739,7 @@ mod tests {
             detections: Vec::new(),
             tasks: Vec::new(),
             counts: Vec::new(),
+            streets: None,
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,
@@ -883,7 +905,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 39] = [
+        let changes: [fn(&mut Mission); 42] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -924,6 +946,17 @@ mod tests {
             },
             |m| m.tasks.push(escort(0)),
             |m| m.tasks.push(escort(1)),
+            |m| m.streets = Some(Arc::new(crate::streets::tests::block())),
+            |m| {
+                let mut streets = crate::streets::tests::block();
+                streets.asked.clear();
+                m.streets = Some(Arc::new(streets));
+            },
+            |m| {
+                let mut streets = crate::streets::tests::block();
+                streets.ways[0].places[1].0 += 1;
+                m.streets = Some(Arc::new(streets));
+            },
             |m| m.counts.push(crossing(0)),
             |m| m.counts.push(crossing(1)),
             |m| {

@@ -17,6 +17,7 @@ use crate::cooperation::{Cooperation, Situation};
 use crate::diary::Diary;
 use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::footprint::Footprint;
+use crate::hint::Hint;
 use crate::inbound::{self, Heard};
 use crate::input::{AskedTask, TaskEdit};
 use crate::input::{Command, Input, Time};
@@ -32,6 +33,7 @@ use crate::protocol::relay::{Offer, Relay};
 use crate::task_desk::TaskView;
 use crate::timers::{Timer, Timers};
 use crate::transmission::Transmission;
+use crate::usage::Usages;
 use crate::why::{self, Other, Why};
 use crate::wire::codec::{self, Body};
 use crate::wire::count::Count;
@@ -43,7 +45,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use skein_behaviors::Percept;
 use skein_behaviors::wind_estimate::WindEstimate;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 /// Most stores under way: one per kind of promise and a few of covered cells. A driver
@@ -992,7 +994,37 @@ impl Peer {
         self.cooperation.tasking.counted(percept_ms)
     }
 
-    /// What is known of the sites of its mission, for a person.
+    /// The places of its mission's streets that this UAV watches by its last percept, by their
+    /// numbers; none without streets.
+    #[must_use]
+    pub fn watched_streets(&self) -> Option<&BTreeSet<usize>> {
+        let percept_ms = self.percept.as_ref().map_or(0, |p| p.time_ms);
+        self.cooperation.tasking.watched(percept_ms)
+    }
+
+    /// What this UAV saw itself of how streets are used, in this life.
+    #[must_use]
+    pub fn own_usages(&self) -> Option<Usages> {
+        self.cooperation.tasking.own_usages()
+    }
+
+    /// What is known of how the streets of its mission are used, by all together.
+    #[must_use]
+    pub fn usages(&self) -> Option<Usages> {
+        let mission = &self.cooperation.state()?.geometry.mission;
+        self.cooperation.tasking.usages(mission)
+    }
+
+    /// The quickest ways that its mission asks for, by what is known now, and from its station to
+    /// all that was detected. Another way is [`Usages::hint`]'s.
+    #[must_use]
+    pub fn hints(&self) -> Vec<Hint> {
+        let state = self.cooperation.state();
+        let mission = state.map(|s| &s.geometry.mission);
+        mission.map_or_else(Vec::new, |m| self.cooperation.tasking.hints(m))
+    }
+
+    /// What is known of the sites of its mission and of its streets, for a person.
     fn counts_told(&self) -> Vec<String> {
         let Some(state) = self.cooperation.state() else {
             return Vec::new();
@@ -1000,7 +1032,11 @@ impl Peer {
         let mission = &state.geometry.mission;
         let counts = self.cooperation.tasking.counts(mission);
         let of = mission.counts.iter().zip(counts);
-        of.map(|(site, count)| count.sentence(site)).collect()
+        let mut told: Vec<String> = of.map(|(site, count)| count.sentence(site)).collect();
+        let hints = self.hints();
+        told.extend(hints.iter().map(Hint::sentence));
+        told.extend(self.usages().iter().flat_map(Usages::sentences));
+        told
     }
 
     /// What it does and why, for a person.

@@ -25,6 +25,7 @@ mod counts;
 mod detecting;
 mod relaying;
 mod tracking;
+mod using;
 
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
@@ -42,6 +43,7 @@ use crate::protocol::auction::flown::RoutedTime;
 use crate::protocol::auction::{self, Auction, Event, KNOWN_MAX, Version};
 use crate::targets::Targets;
 use crate::task_desk::TaskHolder;
+use crate::usage::Using;
 use crate::wire::codec::Body;
 use crate::wire::limits::{DURATION_MAX_MS, PEERS_MAX};
 use crate::wire::message::{Member, Record};
@@ -118,6 +120,8 @@ pub(crate) struct Tasking {
     pub(crate) detections: Detections,
     /// What it and others counted at its sites.
     pub(crate) counting: Counting,
+    /// And how they saw its streets used.
+    pub(crate) using: Using,
     /// The version of the bundle that was spoken last.
     spoken: Option<Version>,
     /// The life in which the tasks of this peer's operator were spoken.
@@ -146,6 +150,7 @@ impl Tasking {
             ),
             detections: Detections::default(),
             counting: Counting::new(config.id.0),
+            using: Using::new(config.id.0),
             spoken: None,
             told_in: 0,
             last_period: Time(0),
@@ -160,6 +165,7 @@ impl Tasking {
         self.targets.begin_life(me.incarnation);
         self.detections.begin_life(me.incarnation);
         self.counting.begin_life(me.incarnation);
+        self.using.begin_life(me.incarnation);
         self.spoken = None;
         self.leave(state);
     }
@@ -228,6 +234,8 @@ impl Tasking {
         beliefs.loads.push(("detections", detections, cap));
         let cap = crate::counting::KNOWN_MAX;
         beliefs.loads.push(("counts", self.counting.len(), cap));
+        let cap = crate::usage::KNOWN_MAX;
+        beliefs.loads.push(("usages", self.using.len(), cap));
     }
 
     /// Whether anything is to be settled or flown.
@@ -249,6 +257,11 @@ impl Tasking {
             Body::Count(count) => {
                 let by = (record.author, record.incarnation);
                 self.counting.hear(by, record.subject, count);
+                Effects::new()
+            }
+            Body::Usage(usage) => {
+                let by = (record.author, record.incarnation);
+                self.using.hear(by, record.subject, usage);
                 Effects::new()
             }
             Body::Task(task) => {

@@ -70,6 +70,7 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         detections: Vec::new(),
         tasks: Vec::new(),
         counts: Vec::new(),
+        streets: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

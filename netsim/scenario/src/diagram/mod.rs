@@ -119,10 +119,17 @@ fn flown(scenario: Result<crate::Scenario, ScenarioError>) -> Result<Diagram, Sc
 /// What a scenario says of its mission: the diagram that it is flown by, where it names one or
 /// brings its own; none where that is the default one.
 pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Diagram>, Error> {
-    let f = node.fields(&["diagram", "for_s", "detections", "tasks", "counts"])?;
+    let f = node.fields(&[
+        "diagram",
+        "for_s",
+        "detections",
+        "tasks",
+        "counts",
+        "streets",
+    ])?;
     let at = match f.get("diagram") {
         None if f.get("for_s").is_none()
-            && ["detections", "tasks", "counts"]
+            && ["detections", "tasks", "counts", "streets"]
                 .iter()
                 .any(|name| f.get(name).is_some()) =>
         {

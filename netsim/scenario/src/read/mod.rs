@@ -11,6 +11,7 @@ pub(crate) mod operator;
 pub(crate) mod radio;
 pub(crate) mod run;
 mod shared;
+pub(crate) mod streets;
 pub(crate) mod targets;
 mod tasks;
 pub(crate) mod terrain;
@@ -40,7 +41,9 @@ use skein_peer::count_site::CountSite;
 use skein_peer::criteria::Criterion;
 use skein_peer::diagram::Diagram;
 use skein_peer::input::NewTask;
+use skein_peer::streets::Streets;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use targets::Asked;
 use terrain::Terrain;
 
@@ -98,6 +101,8 @@ pub(crate) struct Stated {
     pub(crate) brought: Vec<NewTask>,
     /// Where vehicles are counted.
     pub(crate) counts: Vec<CountSite>,
+    /// The streets of the mission.
+    pub(crate) streets: Option<Arc<Streets>>,
     /// By what rule the loop is divided.
     pub(crate) division: Rule,
     pub(crate) lanes: Lanes,
@@ -164,6 +169,9 @@ pub(crate) fn scenario(
         || Ok(Vec::new()),
         |list| vehicles::read(list, (terrain.origin, files), &mut notices),
     )?;
+    let streets = f.get("mission").map_or(Ok(None), |node| {
+        streets::of_mission(node, (terrain.origin, files), &terrain.area, &mut notices)
+    })?;
     let mut findings: Vec<Finding> = notices
         .into_iter()
         .map(|(field, text)| Finding {
@@ -193,6 +201,7 @@ pub(crate) fn scenario(
         counts: f
             .get("mission")
             .map_or(Ok(Vec::new()), counts::of_mission)?,
+        streets,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f

@@ -220,7 +220,7 @@ fn typed_way(node: &Node<'_>) -> Result<Vec<Point>, Error> {
 }
 
 /// The parts of a way that lie within the area, cut at its border.
-fn within(way: &[Point], area: &Polygon) -> Vec<Vec<Point>> {
+pub(super) fn within(way: &[Point], area: &Polygon) -> Vec<Vec<Point>> {
     let mut parts: Vec<Vec<Point>> = Vec::new();
     let mut part: Vec<Point> = Vec::new();
     for w in way.windows(2) {

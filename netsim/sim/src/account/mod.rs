@@ -39,6 +39,7 @@ pub use work::Held;
 use crate::check::contours::ContourReport;
 use crate::check::counts::CountReport;
 use crate::check::detections::DetectionReport;
+use crate::check::streets::StreetsReport;
 pub use crate::check::tracks::Tracked;
 use crate::world::{Fact, Judge, Loss};
 use connectivity::Connectivity;
@@ -94,6 +95,7 @@ pub struct Account {
     detections: Vec<DetectionReport>,
     contour: Option<ContourReport>,
     counts: Vec<CountReport>,
+    streets: Option<StreetsReport>,
     found_ms: Option<u64>,
     over_ms: Option<u64>,
 }
@@ -119,6 +121,7 @@ impl Account {
             detections: Vec::new(),
             contour: None,
             counts: Vec::new(),
+            streets: None,
             found_ms: None,
             over_ms: None,
             setting,
@@ -152,6 +155,11 @@ impl Account {
     /// What is known so far of the sites at which the mission counts, beside what is true.
     pub fn counted(&mut self, reports: Vec<CountReport>) {
         self.counts = reports;
+    }
+
+    /// How the streets of the mission are used, beside what is true.
+    pub fn used(&mut self, report: Option<StreetsReport>) {
+        self.streets = report;
     }
 
     /// What came so far of the objects that the mission looks for, as the world knows.
@@ -456,6 +464,7 @@ impl Account {
             detections: self.detections.clone(),
             contour: self.contour.clone(),
             counts: self.counts.clone(),
+            streets: self.streets.clone(),
             found_ms: self.found_ms,
             over_ms: self.over_ms,
             finished,

@@ -10,6 +10,7 @@ use crate::check::contours::ContourReport;
 use crate::check::counts::CountReport;
 use crate::check::detections::DetectionReport;
 use crate::check::footprint::FootprintErrors;
+use crate::check::streets::StreetsReport;
 use crate::check::wind::WindErrors;
 use crate::check::{Findings, Violation};
 use crate::world::Judge;
@@ -98,6 +99,10 @@ pub struct RunReport {
     /// Each site at which vehicles are counted: what is known, beside what is true.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub counts: Vec<CountReport>,
+    /// How the streets of the mission are used, and hinted ways: what is known, beside what is
+    /// true.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub streets: Option<StreetsReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
     /// Live UAVs at the end that hold a relay position, with everything covered.

@@ -3,6 +3,7 @@
 use super::lifetimes::Cause;
 use super::report::{Driver, KillReport, RestartReport, RunReport};
 use super::secs;
+use crate::check::streets::StreetsReport;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -36,6 +37,9 @@ impl fmt::Display for RunReport {
         }
         for count in &self.counts {
             writeln!(f, "  count      {}", count.line())?;
+        }
+        for line in self.streets.iter().flat_map(StreetsReport::lines) {
+            writeln!(f, "  streets    {line}")?;
         }
         self.write_radio(f)?;
         self.write_checks(f)?;

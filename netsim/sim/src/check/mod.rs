@@ -26,6 +26,7 @@
 //! | [`wind`] | who estimates the wind is right |
 //! | [`contours`] | what is told of a contour is there, and who flies along one has it in its picture |
 //! | [`counts`] | what is counted at the sites of a mission is what truly passes and stands there |
+//! | [`streets`] | how streets are used is told as it is, and hinted ways are quick |
 //! | [`detections`] | what a mission looks for and one had in sight is told, once, and is there |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
 //! | [`airtime`] | S9: shares of the channel |
@@ -64,6 +65,7 @@ pub mod rules;
 pub mod snapshot;
 pub mod spoken;
 pub mod spread;
+pub mod streets;
 pub mod tasks;
 #[cfg(test)]
 mod testing;

@@ -16,6 +16,7 @@ use super::record::Said;
 use super::relays::RelayCheck;
 use super::spoken::SpokenCheck;
 use super::spread::SpreadCheck;
+use super::streets::StreetCheck;
 use super::tasks::TaskCheck;
 use super::tracks::TrackCheck;
 use super::watch::WatchCheck;
@@ -69,6 +70,8 @@ pub struct Rules {
     pub contours: ContourCheck,
     /// What is counted at its sites.
     pub counts: CountCheck,
+    /// How its streets are used.
+    pub streets: StreetCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -106,6 +109,7 @@ impl Rules {
             detections: DetectionCheck::default(),
             contours: ContourCheck::default(),
             counts: CountCheck::default(),
+            streets: StreetCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -121,6 +125,7 @@ impl Rules {
         self.activity.on_mission(mission);
         self.detections.on_mission(mission);
         self.counts.on_mission(mission);
+        self.streets.on_mission(mission);
         self.spread
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }

@@ -34,6 +34,7 @@ pub mod outcome;
 mod queue;
 mod sim_peer;
 pub(crate) mod stream;
+mod streets;
 mod traffic;
 
 pub use outcome::Outcome;
@@ -147,6 +148,8 @@ pub struct Swarm {
     done: bool,
     /// All is over but the way home of those who are finished.
     homing: bool,
+    /// When UAVs were asked last what they saw of streets, milliseconds.
+    streets_at_ms: u64,
     unassigned: bool,
     traffic: Traffic,
     /// The bytes that a peer said last, for an outsider to spoil.
@@ -188,6 +191,7 @@ impl Swarm {
             spoken: BTreeMap::new(),
             done: false,
             homing: false,
+            streets_at_ms: 0,
             unassigned: false,
             traffic: Traffic::default(),
             last_said: Vec::new(),
@@ -439,6 +443,7 @@ impl Swarm {
         self.feed(idx, Input::Percept(percept));
         self.note_counts(idx);
         self.note_footprint(idx);
+        self.note_streets(idx);
     }
 
     fn advance_world(&mut self) {
@@ -842,6 +847,7 @@ impl Swarm {
         self.judge_detections(&peers);
         self.judge_contour(&peers);
         self.judge_counts(&peers);
+        self.judge_streets(&peers);
         self.unassigned = peers.iter().any(|m| !m.view.unassigned.is_empty());
         let mut flying = 0;
         let (mut finished, mut ended) = (true, true);

@@ -66,6 +66,7 @@ impl Swarm {
     pub(super) fn outcome(&mut self) -> Outcome {
         self.air.advance(self.now_ms);
         self.check_the_end();
+        self.conclude_streets();
         let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
         rules.counts.on_end(self.now_ms, found);
         for p in &self.peers {

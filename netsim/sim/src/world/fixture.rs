@@ -176,6 +176,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         detections: Vec::new(),
         tasks: Vec::new(),
         counts: Vec::new(),
+        streets: None,
         tree: skein_flight::coverage::ring::Tree::default(),
         division: Default::default(),
         separation_mm: 0,

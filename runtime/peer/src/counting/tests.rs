@@ -131,7 +131,8 @@ fn who_drove_in_before_the_site_was_watched_or_while_another_counts_does_not_cou
     let mut scene = Scene::new(Counted::Passing);
     let near = [(Pose::new(Point::new(8.0, 0.0), 0.0), 200)];
     scene.look(0.2, &|_| Vec::new());
-    scene.counting.heed(&near, 1_000, &airframe());
+    let others = flown_on(&near, 1_000, &airframe());
+    scene.counting.heed(&others, &airframe());
     scene.look(8.0, &|s| vec![car(s)]);
     assert_eq!(
         scene.own(),
@@ -141,9 +142,8 @@ fn who_drove_in_before_the_site_was_watched_or_while_another_counts_does_not_cou
         }
     );
     // Of whom nothing was heard any more that one counts no longer.
-    scene
-        .counting
-        .heed(&[(near[0].0, 3_100)], 1_000, &airframe());
+    let others = flown_on(&[(near[0].0, 3_100)], 1_000, &airframe());
+    scene.counting.heed(&others, &airframe());
     let car = drives(11.0);
     scene.look(8.0, &|s| vec![car(s)]);
     assert_eq!(scene.own().passed, 1);

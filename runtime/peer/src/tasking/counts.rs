@@ -1,15 +1,15 @@
-//! When a UAV counts at the sites of its mission, and when it tells of that (D2.7 §3.1). What
-//! counts is [`crate::counting`]'s.
+//! When a UAV counts at the sites of its mission and on its streets, and when it tells of that
+//! (D2.7 §3.1). What counts is [`crate::counting`]'s and [`crate::usage`]'s.
 //!
 //! | what holds | it counts |
 //! |---|---|
-//! | its mission has sites, and is not over for it | in each look |
+//! | its mission has sites or streets, and is not over for it | in each look |
 //! | the mission is over or cancelled, or another process speaks under its id | no more; what it counted it tells |
 
 use super::Tasking;
 use crate::Mission;
 use crate::cooperation::Situation;
-use crate::counting::SiteCount;
+use crate::counting::{SiteCount, flown_on};
 use crate::effect::Effects;
 use crate::mission_state::MissionState;
 use crate::wire::count::Count;
@@ -20,24 +20,24 @@ impl Tasking {
     /// A look at the sites.
     pub(super) fn count(&mut self, percept: &Percept, state: &MissionState) {
         let mission = &state.geometry.mission;
-        let (Some(airframe), false) = (self.flies, mission.counts.is_empty()) else {
+        let Some(airframe) = self.flies.filter(|_| !percept.sightings.is_absent()) else {
             return;
         };
-        if percept.sightings.is_absent() {
-            return;
-        }
         let counts = !mission.cancelled && !state.silent && !state.stage.ended();
         let (tracks, _) = self.targets.tracks();
-        self.counting
+        if !mission.counts.is_empty() {
+            self.counting
+                .look(percept, &airframe, tracks, (mission, counts));
+        }
+        self.using
             .look(percept, &airframe, tracks, (mission, counts));
     }
 
     /// Heeds who else is above the sites, and tells what is to be told.
     pub(super) fn tell_of_counts(&mut self, s: &Situation<'_>, state: &MissionState) -> Effects {
-        let Some(airframe) = self
-            .flies
-            .filter(|_| !state.geometry.mission.counts.is_empty())
-        else {
+        let mission = &state.geometry.mission;
+        let is_idle = mission.counts.is_empty() && mission.streets.is_none();
+        let Some(airframe) = self.flies.filter(|_| !is_idle) else {
             return Effects::new();
         };
         let lower = s.membership.live().filter(|(id, _)| *id < self.me);
@@ -48,12 +48,16 @@ impl Tasking {
         };
         let others: Vec<(Pose, u64)> = lower.filter_map(place).collect();
         let interval_ms = s.membership.interval_ms();
-        self.counting.heed(&others, interval_ms, &airframe);
-        if s.speaks {
-            self.counting.tell(s.now, interval_ms)
-        } else {
-            Effects::new()
+        let others = flown_on(&others, interval_ms, &airframe);
+        self.counting.heed(&others, &airframe);
+        self.using.heed(others);
+        if !s.speaks {
+            return Effects::new();
         }
+        let mut effects = self.counting.tell(s.now, interval_ms);
+        let counts = !mission.cancelled && !state.stage.ended();
+        effects.extend(self.using.tell(s.now, interval_ms, counts));
+        effects
     }
 
     /// What all together counted at each site of the mission, as far as is known here.

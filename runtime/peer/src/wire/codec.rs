@@ -26,6 +26,7 @@ use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 use super::target::Target;
 use super::tasks::{Bundle, Task};
 use super::trail::Trail;
+use super::usage::Usage;
 use crate::protocol::conflict::Intent;
 use crate::protocol::promises::Brief;
 use crate::varint;
@@ -99,6 +100,7 @@ pub enum Body {
     Detection(Detection),
     Trail(Trail),
     Count(Count),
+    Usage(Usage),
 }
 
 impl Body {
@@ -124,6 +126,7 @@ impl Body {
             Self::Detection(_) => Kind::Detection,
             Self::Trail(_) => Kind::Trail,
             Self::Count(_) => Kind::Count,
+            Self::Usage(_) => Kind::Usage,
         }
     }
 
@@ -160,6 +163,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Detection(b) => b.put(&mut out),
         Body::Trail(b) => b.put(&mut out),
         Body::Count(b) => b.put(&mut out),
+        Body::Usage(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -195,6 +199,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Detection => Body::Detection(Wire::get(&mut input)?),
         Kind::Trail => Body::Trail(Wire::get(&mut input)?),
         Kind::Count => Body::Count(Wire::get(&mut input)?),
+        Kind::Usage => Body::Usage(Wire::get(&mut input)?),
         Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),

@@ -51,6 +51,8 @@ pub enum Kind {
     Trail = 17,
     /// What the author counted at a site of the mission.
     Count = 18,
+    /// How the author saw streets of the mission used.
+    Usage = 19,
 }
 
 /// How long a record waiting to be sent matters.
@@ -108,7 +110,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 19] = [
+const TABLE: [KindRow; 20] = [
     KindRow {
         relayed: false,
         ..row(
@@ -288,11 +290,21 @@ const TABLE: [KindRow; 19] = [
             Lifetime::Ms(60_000),
         )
     },
+    KindRow {
+        subjects: super::usage::USAGES_MAX,
+        ..row(
+            Kind::Usage,
+            "usage",
+            448,
+            Priority::Telemetry,
+            Lifetime::Ms(60_000),
+        )
+    },
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -312,6 +324,7 @@ impl Kind {
         Self::Detection,
         Self::Trail,
         Self::Count,
+        Self::Usage,
     ];
 
     /// Its number on the wire.
@@ -415,7 +428,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(19), None);
+        assert_eq!(Kind::of_number(20), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

@@ -82,6 +82,7 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
         Body::Detection(d) => super::detection::check(d),
         Body::Trail(t) => super::trail::check(t),
         Body::Count(c) => super::count::check(c),
+        Body::Usage(u) => super::usage::check(u),
     }
 }
 

@@ -16,3 +16,4 @@ pub mod signature;
 pub mod target;
 pub mod tasks;
 pub mod trail;
+pub mod usage;

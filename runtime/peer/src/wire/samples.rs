@@ -119,6 +119,10 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         Body::Count(super::count::samples::count()),
         "871a123456781a00013df80e19ee481910d60000",
     ));
+    all.push((
+        Body::Usage(super::usage::samples::usage()),
+        "831a1234567882861119072618d60018a30486131907260000000080",
+    ));
     all
 }
 
@@ -344,6 +348,7 @@ pub fn largest() -> Vec<Body> {
     all.extend(super::detection::samples::largest());
     all.extend(super::trail::samples::largest());
     all.extend(super::count::samples::largest());
+    all.extend(super::usage::samples::largest());
     all
 }
 

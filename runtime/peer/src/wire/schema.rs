@@ -492,6 +492,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Detection => Some(super::detection::DETECTION),
         Kind::Trail => Some(super::trail::TRAIL),
         Kind::Count => Some(super::count::COUNT),
+        Kind::Usage => Some(super::usage::USAGE),
         Kind::Event => None,
     }
 }

@@ -8,6 +8,7 @@ use super::super::signature::Off;
 use super::super::target::Target;
 use super::super::tasks::{Progress, TaskKind};
 use super::super::trail::Trail;
+use super::super::usage::{TurnUse, Usage};
 use super::*;
 use crate::PeerId;
 use proptest::collection::vec;
@@ -435,6 +436,27 @@ fn every_limit_is_sharp() {
                 with(&|d| d.east_mmps -= 1, "east_mmps");
                 with(&|d| d.north_mmps -= 1, "north_mmps");
             }
+            Body::Usage(u) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut Usage), field| {
+                    let mut u = u.clone();
+                    change(&mut u);
+                    refused(&Body::Usage(u), field);
+                };
+                if u.stretches.is_empty() {
+                    with(&|u| u.turns[31].turn += 1, "turn");
+                    with(&|u| u.turns[1].turn = u.turns[0].turn, "turns");
+                    with(&|u| u.turns.push(TurnUse::default()), "turns");
+                } else {
+                    with(&|u| u.stretches[15].stretch += 1, "stretch");
+                    with(&|u| u.stretches.swap(0, 1), "stretches");
+                    with(&|u| u.stretches[0].watched_m_s += 1, "watched_m_s");
+                    with(&|u| u.stretches[0].spent_ds += 1, "spent_ds");
+                    with(&|u| u.stretches[0].spent_ds -= 1, "stood_ds");
+                    with(&|u| u.stretches[0].driven_m += 1, "driven_m");
+                    with(&|u| u.turns.push(TurnUse::default()), "turns");
+                }
+            }
             Body::Count(c) => {
                 kinds += 1;
                 let with = |change: &dyn Fn(&mut Count), field| {
@@ -462,7 +484,7 @@ fn every_limit_is_sharp() {
             Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 17);
+    assert_eq!(kinds, 19);
 }
 
 #[test]
@@ -518,7 +540,7 @@ fn envelopes_beyond_the_table_are_refused() {
     };
     assert!(of(|_| ()).is_ok());
     assert_eq!(of(|r| r.kind = 8), Err(WireError::Kind { number: 8 }));
-    assert_eq!(of(|r| r.kind = 19), Err(WireError::Kind { number: 19 }));
+    assert_eq!(of(|r| r.kind = 20), Err(WireError::Kind { number: 20 }));
     assert_eq!(
         of(|r| r.subject = 1),
         Err(WireError::Range { field: "subject" })

@@ -1,0 +1,236 @@
+//! The quickest way along a network from a place to a place (D2.7 §3.1: path hints for emergency
+//! vehicles), by Dijkstra's algorithm from petgraph.
+//!
+//! # Guarantees
+//! No way along the streets takes less, from the place of a street that is nearest to the first
+//! place to that nearest to the second, by the seconds a metre that each stretch is given.
+
+use super::matching::Matched;
+use super::network::Network;
+use petgraph::algo::astar;
+use petgraph::graph::{NodeIndex, UnGraph};
+use skein_geometry::frame::Point;
+
+/// Who asks is no farther from a street, metres.
+pub const REACH_M: f64 = 150.0;
+
+/// What is shorter is no part of a way, metres.
+const LEAST_M: f64 = 1e-6;
+
+/// A part of a way: a stretch, or some of one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leg {
+    /// Which stretch.
+    pub edge: u16,
+    /// From where to where along it, metres; the second is the less where it is driven backwards.
+    pub from_m: f64,
+    /// To where.
+    pub to_m: f64,
+}
+
+impl Leg {
+    /// How long it is, metres.
+    #[must_use]
+    pub fn length_m(&self) -> f64 {
+        (self.to_m - self.from_m).abs()
+    }
+}
+
+impl Network {
+    /// The place of a street that is nearest; none within [`REACH_M`].
+    #[must_use]
+    pub fn nearest(&self, to: Point) -> Option<Matched> {
+        let mut best: Option<Matched> = None;
+        for (edge, e) in (0_u16..).zip(self.edges()) {
+            let mut before_m = 0.0;
+            for w in e.way.windows(2) {
+                let (along, length_m) = (w[1] - w[0], (w[1] - w[0]).norm());
+                if length_m <= 0.0 {
+                    continue;
+                }
+                let share = (along.dot(&(to - w[0])) / (length_m * length_m)).clamp(0.0, 1.0);
+                let aside_m = (w[0] + along * share - to).norm();
+                if aside_m <= best.map_or(REACH_M, |b| b.aside_m) {
+                    best = Some(Matched {
+                        edge,
+                        along_m: before_m + share * length_m,
+                        aside_m,
+                    });
+                }
+                before_m += length_m;
+            }
+        }
+        best
+    }
+
+    /// The quickest way, its parts in order; none where the streets do not lead there, or a place
+    /// is far from all of them. `s_per_m` gives the seconds a metre of each stretch.
+    #[must_use]
+    pub fn quickest(
+        &self,
+        from: Point,
+        to: Point,
+        s_per_m: &dyn Fn(u16) -> f64,
+    ) -> Option<Vec<Leg>> {
+        let (begin, end) = (self.nearest(from)?, self.nearest(to)?);
+        // Nodes are the crossings, then the two places.
+        let mut graph: UnGraph<(), (f64, Leg)> = UnGraph::default();
+        let nodes: Vec<NodeIndex> = (0..self.crossings().len() + 2)
+            .map(|_| graph.add_node(()))
+            .collect();
+        let (first, last) = (nodes[nodes.len() - 2], nodes[nodes.len() - 1]);
+        let node = |crossing: u16| nodes.get(usize::from(crossing)).copied();
+        let mut join = |a: NodeIndex, b: NodeIndex, leg: Leg| {
+            let cost_s = leg.length_m() * s_per_m(leg.edge).max(0.0);
+            graph.add_edge(a, b, (cost_s, leg));
+        };
+        for (edge, e) in (0_u16..).zip(self.edges()) {
+            let whole = Leg {
+                edge,
+                from_m: 0.0,
+                to_m: e.length_m,
+            };
+            join(node(e.ends[0])?, node(e.ends[1])?, whole);
+        }
+        for (at, m) in [(first, begin), (last, end)] {
+            let e = self.edges().get(usize::from(m.edge))?;
+            for (end, to_m) in [(e.ends[0], 0.0), (e.ends[1], e.length_m)] {
+                let part = Leg {
+                    edge: m.edge,
+                    from_m: m.along_m,
+                    to_m,
+                };
+                join(at, node(end)?, part);
+            }
+        }
+        if begin.edge == end.edge {
+            let part = Leg {
+                edge: begin.edge,
+                from_m: begin.along_m,
+                to_m: end.along_m,
+            };
+            join(first, last, part);
+        }
+        let cost = |e: petgraph::graph::EdgeReference<'_, (f64, Leg)>| e.weight().0;
+        let (_, way) = astar(&graph, first, |n| n == last, cost, |_| 0.0)?;
+        let legs = way.windows(2).map(|w| {
+            let between = graph.edges_connecting(w[0], w[1]);
+            let least = between.min_by(|a, b| a.weight().0.total_cmp(&b.weight().0))?;
+            let leg = least.weight().1;
+            // Edges of the graph have no direction: a stretch begins where it was put in.
+            let (source, _) = graph.edge_endpoints(petgraph::visit::EdgeRef::id(&least))?;
+            Some(if source == w[0] {
+                leg
+            } else {
+                Leg {
+                    from_m: leg.to_m,
+                    to_m: leg.from_m,
+                    ..leg
+                }
+            })
+        });
+        let mut legs = legs.collect::<Option<Vec<Leg>>>()?;
+        // Who begins or ends at a crossing drives nothing of the stretch that was found nearest.
+        let driven = legs.iter().any(|l| l.length_m() > LEAST_M);
+        legs.retain(|l| !driven || l.length_m() > LEAST_M);
+        Some(legs)
+    }
+
+    /// The middle line of a way, metres.
+    #[must_use]
+    pub fn line(&self, legs: &[Leg]) -> Vec<Point> {
+        let mut line = Vec::new();
+        for leg in legs {
+            let Some(e) = self.edges().get(usize::from(leg.edge)) else {
+                continue;
+            };
+            let (low_m, high_m) = (leg.from_m.min(leg.to_m), leg.from_m.max(leg.to_m));
+            let mut part: Vec<Point> = super::network::along(&e.way, low_m).into_iter().collect();
+            let mut m = 0.0;
+            for w in e.way.windows(2) {
+                m += (w[1] - w[0]).norm();
+                if m > low_m && m < high_m {
+                    part.push(w[1]);
+                }
+            }
+            part.extend(super::network::along(&e.way, high_m));
+            if leg.from_m > leg.to_m {
+                part.reverse();
+            }
+            line.extend(part);
+        }
+        line.dedup();
+        line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::network::tests::grid;
+    use super::*;
+    use crate::streets::network::length_m;
+    use skein_geometry::random::SplitMix64;
+
+    #[test]
+    fn the_way_is_the_quickest_and_goes_round_what_is_slow() {
+        let net = Network::of(&grid(3, 100.0));
+        let (from, to) = (Point::new(0.0, 150.0), Point::new(300.0, 150.0));
+        let even = net.quickest(from, to, &|_| 0.1).unwrap();
+        assert!((even.iter().map(Leg::length_m).sum::<f64>() - 400.0).abs() < 1e-6);
+        let line = net.line(&even);
+        assert!((length_m(&line) - 400.0).abs() < 1e-6);
+        assert!((line[0] - from).norm() < 1e-9 && (line[line.len() - 1] - to).norm() < 1e-9);
+        let slow: Vec<u16> = even.iter().map(|l| l.edge).collect();
+        let round = net
+            .quickest(from, to, &|e| {
+                if slow[1..slow.len() - 1].contains(&e) {
+                    2.0
+                } else {
+                    0.1
+                }
+            })
+            .unwrap();
+        assert!(
+            !round
+                .iter()
+                .any(|l| slow[1..slow.len() - 1].contains(&l.edge))
+        );
+        assert!(net.quickest(Point::new(900.0, 0.0), to, &|_| 0.1).is_none());
+        let near = net
+            .quickest(from, Point::new(0.0, 180.0), &|_| 0.1)
+            .unwrap();
+        assert!(near.len() == 1 && (near[0].length_m() - 30.0).abs() < 1e-9);
+    }
+
+    /// Bellman and Ford, on crossings alone.
+    #[test]
+    fn no_way_by_brute_force_takes_less() {
+        let net = Network::of(&grid(3, 100.0));
+        let mut random = SplitMix64::new(4);
+        for _ in 0..50 {
+            let pace: Vec<f64> = net.edges().iter().map(|_| 0.05 + random.unit()).collect();
+            let n = net.crossings().len();
+            let (a, b) = (random.below(n), random.below(n));
+            if a == b {
+                continue;
+            }
+            let mut least = vec![f64::INFINITY; n];
+            least[a] = 0.0;
+            for _ in 0..n {
+                for (e, s) in net.edges().iter().zip(&pace) {
+                    let [x, y] = e.ends.map(usize::from);
+                    let cost = e.length_m * s;
+                    least[y] = least[y].min(least[x] + cost);
+                    least[x] = least[x].min(least[y] + cost);
+                }
+            }
+            let (from, to) = (net.crossings()[a], net.crossings()[b]);
+            let legs = net.quickest(from, to, &|e| pace[usize::from(e)]).unwrap();
+            let cost: f64 = legs
+                .iter()
+                .map(|l| l.length_m() * pace[usize::from(l.edge)])
+                .sum();
+            assert!((cost - least[b]).abs() < 1e-6, "{cost} {}", least[b]);
+        }
+    }
+}
