@@ -197,6 +197,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Detection(b) => serde_json::to_value(b),
         Body::Trail(b) => serde_json::to_value(b),
         Body::Count(b) => serde_json::to_value(b),
+        Body::Usage(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,

@@ -196,7 +196,7 @@ enum Happened {
     Stored(Stored),
     Computed(u64, JobResult),
     Asked(Asked<Request>),
-    Checked(Feasibility),
+    Checked(Box<Feasibility>),
     Transport(Event),
     Time,
 }
@@ -263,7 +263,7 @@ where
                 Some(stored) = self.journal.answer() => Happened::Stored(stored),
                 Some((token, result)) = self.results.recv() => Happened::Computed(token, result),
                 asked = console.next() => Happened::Asked(asked),
-                Some(found) = self.verdicts.recv() => Happened::Checked(found),
+                Some(found) = self.verdicts.recv() => Happened::Checked(Box::new(found)),
                 event = transport.next(), if hears => Happened::Transport(event),
                 () = tokio::time::sleep(wait) => Happened::Time,
             };
@@ -302,7 +302,7 @@ where
             Happened::Stored(Stored { token, ok }) => self.step(Input::Stored { token, ok }).await,
             Happened::Computed(token, result) => self.step(Input::Computed { token, result }).await,
             Happened::Asked(asked) => self.asked(asked).await,
-            Happened::Checked(found) => self.mission_checked(found).await,
+            Happened::Checked(found) => self.mission_checked(*found).await,
             Happened::Transport(event) => {
                 if self.clock.stands_still(Instant::now()) {
                     self.early = Some(event);
