@@ -3,7 +3,7 @@
 //!
 //! The seconds that a metre of a stretch takes are those that vehicles were seen to take, those of
 //! the last interval with full weight and each earlier one with half of the next one's, beside
-//! [`PRIOR_S`] of one vehicle at the usual speed. Where vehicles are seen to stand, on and on, a
+//! `PRIOR_S` of one vehicle at the usual speed. Where vehicles are seen to stand, on and on, a
 //! stretch is blocked: it is driven only where there is no other way.
 
 use crate::usage::{StretchSum, Usages};

@@ -2,7 +2,7 @@
 //! how a gimbal is turned, and what is in the picture.
 //!
 //! The flown path turns at once; the wings follow it at the airframe's roll rate, and a gimbal
-//! what it is told at its own. Both move in steps of [`STEP_MS`], whoever asks how often.
+//! what it is told at its own. Both move in steps of `STEP_MS`, whoever asks how often.
 //! The picture is that of a pinhole by the world's own geometry: axes of the camera, and places
 //! along them. A level camera has none of this: its picture is a rectangle straight below.
 

@@ -7,7 +7,7 @@
 //!
 //! # Guarantees
 //! Numbers follow from the lines alone, whatever their order: stretches are sorted by the square
-//! of [`SQUARE_M`] that their middle is in, so neighbours have near numbers.
+//! of `SQUARE_M` that their middle is in, so neighbours have near numbers.
 //!
 //! # Complexity
 //! O(n log n) for n points.
