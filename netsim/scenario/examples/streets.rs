@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p skein-scenario --example streets -- streets 1,3,8 0..10 storm`
 //!
-//! Faults are those of the scenario, `none`, or what the `storm` of the seed draws.
+//! Faults are those of the scenario, none where that is `calm`, or what the `storm` of the seed draws.
 
 #[path = "shared/campaign.rs"]
 mod campaign;
@@ -11,9 +11,6 @@ mod shared;
 
 use campaign::{Campaign, Flown, Teller};
 use skein_netsim::StreetsReport;
-use skein_netsim::prepared::Prepared;
-use skein_netsim::runs::{Wanted, faults_of, run};
-use skein_netsim::swarm::Outcome;
 use std::process::ExitCode;
 
 /// All runs together.
@@ -77,23 +74,6 @@ impl Totals {
 }
 
 impl Teller for Totals {
-    fn fly(
-        &self,
-        prepared: &Prepared,
-        seed: u64,
-        (wrong, free_ms): (&str, Option<u64>),
-        wanted: Wanted,
-    ) -> Outcome {
-        match (free_ms, wrong) {
-            (Some(_), _) => {
-                let (struck, faults) = faults_of(prepared, seed, free_ms);
-                run(&struck, seed, faults, wanted)
-            }
-            (None, "none") => run(prepared, seed, Vec::new(), wanted),
-            (None, _) => run(prepared, seed, prepared.spec.faults.clone(), wanted),
-        }
-    }
-
     fn tell(&mut self, flown: &Flown<'_>) {
         let r = &flown.outcome.report;
         self.runs += 1;
