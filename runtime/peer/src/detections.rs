@@ -228,7 +228,11 @@ impl Detections {
             };
             let watch = key.and_then(|k| before.remove(&k));
             let is_on = |w: &Watch| now_ms.saturating_sub(w.last_ms) <= GAP_MS;
-            let mut watch = watch.filter(is_on).unwrap_or(anew);
+            // A watch begins with a look: where one who is out of sight may be is a guess.
+            let begins = (t.seen_ms == now_ms).then_some(anew);
+            let Some(mut watch) = watch.filter(is_on).or(begins) else {
+                continue;
+            };
             if t.seen_ms == now_ms {
                 watch.hits = watch.hits.saturating_add(1);
                 watch.last_ms = now_ms;

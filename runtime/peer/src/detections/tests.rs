@@ -200,3 +200,33 @@ fn who_gets_the_name_of_one_that_was_lost_is_as_fast_as_it_is_itself() {
     assert_eq!(heir.0, 1, "it has the name of the first");
     assert!(heir.1 < STILL_MMPS, "{speeds:?}");
 }
+
+#[test]
+fn who_is_found_again_is_as_fast_as_it_is_from_then_on() {
+    use skein_flight::tracking::estimate::Detection as Look;
+    use skein_flight::tracking::tracks::{Kind, Sighting};
+    let bus = |x: f64, y: f64| Sighting {
+        detection: Look::round(Point::new(x, y), 0.6),
+        kind: Kind(3),
+    };
+    let mut tracks = Tracks::new(3, 5.0);
+    let mut all = Detections::default();
+    let mut speeds = Vec::new();
+    for k in 0..100_u64 {
+        let now_ms = 10_000 + 200 * k;
+        // It drives for two seconds, is behind a house for twelve, has turned round meanwhile and
+        // stands.
+        let look = match k {
+            0..10 => vec![bus(6.0 * 0.2 * f64::from(u32::try_from(k).unwrap()), 0.0)],
+            10..70 => Vec::new(),
+            _ => vec![bus(-10.0, 40.0)],
+        };
+        tracks.look(now_ms, &look, &|_| !look.is_empty());
+        all.watch(now_ms, &tracks);
+        let seen = all.seen(now_ms, &tracks, 2.0);
+        speeds.extend(seen.map(|s| (s.name.number, s.speed_mmps())));
+    }
+    let found = speeds.first().expect("it is seen beyond doubt");
+    assert_eq!(found.0, 1, "it has its name");
+    assert!(found.1 < STILL_MMPS, "{speeds:?}");
+}
