@@ -40,10 +40,19 @@ impl View {
             attitude: percept.attitude,
         });
         Self {
-            pose: percept.pose,
+            tilt,
+            ..Self::level(percept.pose, airframe)
+        }
+    }
+
+    /// What a UAV that flies level has in its picture at a pose.
+    #[must_use]
+    pub fn level(pose: Pose, airframe: &Airframe) -> Self {
+        Self {
+            pose,
             across_m: airframe.footprint_across_m,
             along_m: airframe.footprint_along_m,
-            tilt,
+            tilt: None,
         }
     }
 

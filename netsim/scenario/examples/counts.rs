@@ -17,8 +17,6 @@ use skein_netsim::account::secs;
 use skein_netsim::account::tasks::TaskReport;
 use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::prepared::Prepared;
-use skein_netsim::runs::{Wanted, faults_of, run};
-use skein_netsim::swarm::Outcome;
 use std::process::ExitCode;
 
 /// What the operator of the scenario asks for is asked for in its storms, too.
@@ -121,23 +119,8 @@ impl Totals {
 }
 
 impl Teller for Totals {
-    fn fly(
-        &self,
-        prepared: &Prepared,
-        seed: u64,
-        (wrong, free_ms): (&str, Option<u64>),
-        wanted: Wanted,
-    ) -> Outcome {
-        match (free_ms, wrong) {
-            (Some(_), _) => {
-                let (struck, mut faults) = faults_of(prepared, seed, free_ms);
-                faults.extend(requests(prepared));
-                faults.sort_by_key(|f| f.at_ms);
-                run(&struck, seed, faults, wanted)
-            }
-            (None, "none") => run(prepared, seed, requests(prepared), wanted),
-            (None, _) => run(prepared, seed, prepared.spec.faults.clone(), wanted),
-        }
+    fn besides(&self, prepared: &Prepared) -> Vec<TimedFault> {
+        requests(prepared)
     }
 
     fn tell(&mut self, flown: &Flown<'_>) {

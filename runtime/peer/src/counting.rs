@@ -20,10 +20,12 @@
 //! any order. Bounded. Without sites nothing is kept and nothing said.
 
 use crate::Incarnation;
+use crate::carried::carried;
 use crate::count_site::{CountSite, Counted};
 use crate::effect::{Effect, Effects};
 use crate::input::Time;
 use crate::mission::Mission;
+use crate::registers::{Grows, Registers};
 use crate::wire::codec::Body;
 use crate::wire::count::Count;
 use serde::{Deserialize, Serialize};
@@ -246,8 +248,7 @@ pub(crate) struct Counting {
     sites: Vec<Site>,
     tracks: BTreeMap<TargetName, Along>,
     last_ms: u64,
-    /// By site, author and life.
-    known: BTreeMap<(u16, u16, Incarnation), Count>,
+    known: Registers<Count, KNOWN_MAX>,
 }
 
 impl Mission {
@@ -267,7 +268,7 @@ impl Mission {
 impl Along {
     fn begun(t: &Track) -> Self {
         Self {
-            begun_ms: t.seen_ms.saturating_sub(t.watched_ms()),
+            begun_ms: t.begun_ms(),
             last: [(t.seen_ms, t.estimate.position()); LAST],
             hits: 0,
             known: 0,
@@ -292,6 +293,16 @@ impl Along {
         let ((from_ms, from), (to_ms, to)) = (self.last[0], self.last[LAST - 1]);
         let over_ms = to_ms.saturating_sub(from_ms);
         (over_ms >= LAST_MS).then(|| (to - from).norm() > STILL_MPS * seconds(over_ms))
+    }
+}
+
+impl Grows for Count {
+    fn of(&self) -> u32 {
+        self.sites
+    }
+
+    fn amount(&self) -> u64 {
+        self.watched_ms
     }
 }
 
@@ -356,9 +367,9 @@ impl Counting {
         self.last_ms = now_ms;
         let counts = counts && percept.takes_off_in_ms == 0;
         let mut watched = 0_u16;
+        let view = View::of(percept, airframe);
         for (i, site) in self.sites.iter_mut().enumerate() {
             let corners = site.outline.vertices();
-            let view = View::of(percept, airframe);
             let is_pictured = || corners.iter().all(|p| view.shows(*p, INNER));
             let is_watched = counts && !site.is_left_to_another && is_pictured();
             let was = site.since_ms.filter(|_| apart_ms > 0);
@@ -459,7 +470,11 @@ impl Counting {
     /// counts. They are taken to have the own airframe, and to fly level.
     pub fn heed(&mut self, others: &[Pose], airframe: &Airframe) {
         for site in &mut self.sites {
-            let has = |pose: &Pose| is_in_picture(*pose, airframe, site.outline.vertices());
+            let corners = site.outline.vertices();
+            let has = |pose: &Pose| {
+                let view = View::level(*pose, airframe);
+                corners.iter().all(|p| view.shows(*p, INNER))
+            };
             site.is_left_to_another = others.iter().any(has);
         }
     }
@@ -478,7 +493,7 @@ impl Counting {
                 break;
             }
             (site.told, site.told_at) = (site.own, now);
-            self.known.insert((subject, me, life), site.own);
+            self.known.told((subject, me, life), site.own);
             effects.push(Effect::Speak(subject, Body::Count(site.own)));
         }
         effects
@@ -490,29 +505,16 @@ impl Counting {
         if author == self.me && life == self.life {
             return;
         }
-        if self.known.len() >= KNOWN_MAX && !self.known.contains_key(&key) {
-            let of = self.of;
-            self.known.retain(|_, c| c.sites == of);
-            if self.known.len() >= KNOWN_MAX {
-                return;
-            }
-        }
-        let held = self.known.entry(key).or_insert(*count);
-        // Its numbers grow, unless its sites are others.
-        if held.sites != count.sites || count.watched_ms >= held.watched_ms {
-            *held = *count;
-        }
+        self.known.hear(key, count, self.of);
     }
 
     /// What all together counted at each site of a mission.
     pub fn sums(&self, mission: &Mission) -> Vec<SiteCount> {
         let of = mission.sites_hash();
         let mut sums = vec![SiteCount::default(); mission.counts.len()];
-        for ((site, author, _), count) in &self.known {
-            if let Some(sum) = sums.get_mut(usize::from(*site))
-                && count.sites == of
-            {
-                sum.add(*author, count);
+        for (site, author, count) in self.known.of(of) {
+            if let Some(sum) = sums.get_mut(usize::from(site)) {
+                sum.add(author, count);
             }
         }
         sums
@@ -547,24 +549,6 @@ pub(crate) fn poisson_range(drawn: u32) -> (f64, f64) {
     (low.max(0.0), high)
 }
 
-/// What was known of a track, under its name or the one that it had; `begun_ms` says when that
-/// track began.
-pub(crate) fn carried<T>(
-    before: &mut BTreeMap<TargetName, T>,
-    begun_ms: fn(&T) -> u64,
-    tracks: &Tracks,
-    t: &Track,
-) -> Option<T> {
-    if let Some(known) = before.remove(&t.name) {
-        return Some(known);
-    }
-    let began_ms = t.seen_ms.saturating_sub(t.watched_ms());
-    let gone = |name: &TargetName| !tracks.all().iter().any(|t| t.name == *name);
-    let mut same = before.iter().filter(|(_, a)| begun_ms(a) == began_ms);
-    let name = same.find(|(name, _)| gone(name)).map(|(name, _)| *name)?;
-    before.remove(&name)
-}
-
 /// Where others are now, if they flew straight on since they said where they were; who was not
 /// heard lately is left out. They are taken to have the own airframe.
 pub(crate) fn flown_on(others: &[(Pose, u64)], interval_ms: u64, airframe: &Airframe) -> Vec<Pose> {
@@ -576,16 +560,6 @@ pub(crate) fn flown_on(others: &[(Pose, u64)], interval_ms: u64, airframe: &Airf
         Pose::new(pose.position() + pose.direction() * on_m, pose.heading_rad)
     };
     fresh.map(now).collect()
-}
-
-/// Whether all of these places are in the inner part of a picture.
-pub(crate) fn is_in_picture(pose: Pose, airframe: &Airframe, places: &[Point]) -> bool {
-    let forward = pose.direction();
-    places.iter().all(|p| {
-        let to = *p - pose.position();
-        let along = forward.dot(&to).abs() <= INNER * airframe.footprint_along_m;
-        along && forward.perp(&to).abs() <= INNER * airframe.footprint_across_m
-    })
 }
 
 /// Whether who stands at a place is seen sharply enough to be told apart.

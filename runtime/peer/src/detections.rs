@@ -17,6 +17,7 @@
 //! Bounded: eight told a life, 256 known. Nothing is drawn and nothing said here.
 
 use crate::Incarnation;
+use crate::carried::carried_alone;
 use crate::criteria::looks_name;
 use crate::mission::{mm, point_m};
 use crate::wire::detection::{DETECTIONS_MAX, Detection, ERROR_MAX_MM, OF_LIFE_MAX, Stands};
@@ -211,22 +212,15 @@ impl Detections {
     pub fn watch(&mut self, now_ms: u64, tracks: &Tracks) {
         let mut before = core::mem::take(&mut self.watches);
         for t in tracks.confirmed() {
-            let begun_ms = t.seen_ms.saturating_sub(t.watched_ms());
             let at = t.estimate.position();
-            // Who was given another name is watched on. Whoever was given the name of one that
-            // was lost may be another: where that one was says nothing of how this one moves.
-            let same = |w: &TargetName| before.get(w).is_some_and(|w| w.begun_ms == begun_ms);
-            let gone = |w: &TargetName| !tracks.all().iter().any(|t| t.name == *w);
-            let renamed = || before.keys().find(|w| same(w) && gone(w)).copied();
-            let key = Some(t.name).filter(same).or_else(renamed);
             let anew = Watch {
-                begun_ms,
+                begun_ms: t.begun_ms(),
                 from: at,
                 from_ms: now_ms,
                 hits: 0,
                 last_ms: now_ms,
             };
-            let watch = key.and_then(|k| before.remove(&k));
+            let watch = carried_alone(&mut before, |w: &Watch| w.begun_ms, tracks, t);
             let is_on = |w: &Watch| now_ms.saturating_sub(w.last_ms) <= GAP_MS;
             // A watch begins with a look: where one who is out of sight may be is a guess.
             let begins = (t.seen_ms == now_ms).then_some(anew);

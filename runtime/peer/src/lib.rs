@@ -91,6 +91,7 @@
 //! with what [`offload::run`] returned, computed wherever the driver likes.
 
 pub mod beliefs;
+mod carried;
 pub mod cells;
 mod company;
 pub mod config;
@@ -120,6 +121,7 @@ pub mod output;
 pub mod overview;
 pub mod peer;
 pub mod protocol;
+mod registers;
 pub mod relay_circle;
 mod separation;
 mod stage;

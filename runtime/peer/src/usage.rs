@@ -18,10 +18,12 @@
 //! Registers merge in any order. Bounded. Without streets nothing is kept and nothing said.
 
 use crate::Incarnation;
-use crate::counting::{GAP_MS, INNER, carried, is_in_picture};
+use crate::carried::carried;
+use crate::counting::{GAP_MS, INNER};
 use crate::effect::{Effect, Effects};
 use crate::input::Time;
 use crate::mission::Mission;
+use crate::registers::{Grows, Registers};
 use crate::streets::Streets;
 use crate::wire::codec::Body;
 use crate::wire::usage::{
@@ -107,8 +109,7 @@ pub(crate) struct Using {
     others: Vec<Pose>,
     told: BTreeMap<u16, (u64, Time)>,
     said_at: Time,
-    /// By subject, author and life.
-    known: BTreeMap<(u16, u16, Incarnation), Usage>,
+    known: Registers<Usage, KNOWN_MAX>,
 }
 
 impl Mission {
@@ -130,11 +131,21 @@ impl Mission {
 impl Along {
     fn begun(t: &Track) -> Self {
         Self {
-            begun_ms: t.seen_ms.saturating_sub(t.watched_ms()),
+            begun_ms: t.begun_ms(),
             stretch: None,
             counted: [None; 3],
             well: None,
         }
+    }
+}
+
+impl Grows for Usage {
+    fn of(&self) -> u32 {
+        self.streets
+    }
+
+    fn amount(&self) -> u64 {
+        Self::amount(self)
     }
 }
 
@@ -228,7 +239,7 @@ impl Using {
 
     /// Whether a place is this peer's to count at.
     fn is_own(&self, view: View, airframe: &Airframe, at: Point) -> bool {
-        let in_other = |other: &Pose| is_in_picture(*other, airframe, &[at]);
+        let in_other = |other: &Pose| View::level(*other, airframe).shows(at, INNER);
         view.shows(at, INNER) && !self.others.iter().any(in_other)
     }
 
@@ -374,8 +385,7 @@ impl Using {
         if let Some((_, subject, own)) = due {
             self.told.insert(subject, (own.amount(), now));
             self.said_at = now;
-            self.known
-                .insert((subject, self.me, self.life), own.clone());
+            self.known.told((subject, self.me, self.life), own.clone());
             effects.push(Effect::Speak(subject, Body::Usage(own)));
         }
         effects
@@ -387,18 +397,8 @@ impl Using {
         if author == self.me && life == self.life {
             return;
         }
-        if self.known.len() >= KNOWN_MAX && !self.known.contains_key(&key) {
-            let of = self.followed.as_ref().map_or(0, |f| f.of);
-            self.known.retain(|_, u| u.streets == of);
-            if self.known.len() >= KNOWN_MAX {
-                return;
-            }
-        }
-        let held = self.known.entry(key).or_default();
-        // Its numbers grow, unless its streets are others.
-        if held.streets != usage.streets || usage.amount() >= held.amount() {
-            held.clone_from(usage);
-        }
+        let of = self.followed.as_ref().map_or(0, |f| f.of);
+        self.known.hear(key, usage, of);
     }
 
     /// What all together saw, as far as is known here; none without streets.
@@ -410,10 +410,8 @@ impl Using {
             _ => Arc::new(streets.network()),
         };
         let mut sums = Usages::new(Arc::clone(streets), network);
-        for ((subject, ..), usage) in &self.known {
-            if usage.streets == of {
-                sums.add(*subject, usage);
-            }
+        for (subject, _, usage) in self.known.of(of) {
+            sums.add(subject, usage);
         }
         Some(sums)
     }

@@ -2,8 +2,9 @@
 
 use super::shared;
 use core::fmt::{Display, Formatter};
+use skein_netsim::fault::TimedFault;
 use skein_netsim::prepared::Prepared;
-use skein_netsim::runs::{Wanted, failure_free_makespan_ms, run, storm};
+use skein_netsim::runs::{Wanted, failure_free_makespan_ms, faults_of, run};
 use skein_netsim::swarm::Outcome;
 use skein_scenario::Seeds;
 use std::process::ExitCode;
@@ -49,20 +50,9 @@ impl Flown<'_> {
 
 /// What an example makes of its runs.
 pub trait Teller {
-    /// What goes wrong in a seed: what the `storm` draws, whose makespan without faults is given,
-    /// nothing where that is `calm`, or else the faults of the scenario.
-    fn fly(
-        &self,
-        prepared: &Prepared,
-        seed: u64,
-        (wrong, free_ms): (&str, Option<u64>),
-        wanted: Wanted,
-    ) -> Outcome {
-        match (free_ms, wrong) {
-            (Some(free_ms), _) => storm(prepared, seed, free_ms, wanted),
-            (None, "calm") => run(prepared, seed, Vec::new(), wanted),
-            (None, _) => run(prepared, seed, prepared.spec.faults.clone(), wanted),
-        }
+    /// What happens besides, in a storm and where nothing goes wrong.
+    fn besides(&self, _prepared: &Prepared) -> Vec<TimedFault> {
+        Vec::new()
     }
 
     /// A run is over; the rules that it broke are told after.
@@ -104,7 +94,8 @@ impl Campaign {
                         events: self.timeline,
                         ..Wanted::default()
                     };
-                    let outcome = teller.fly(&prepared, seed, (&self.wrong, free_ms), wanted);
+                    let (struck, faults) = self.faults_of(&prepared, seed, free_ms, teller);
+                    let outcome = run(&struck, seed, faults, wanted);
                     passed &= outcome.report.passed;
                     teller.tell(&Flown {
                         name,
@@ -122,6 +113,28 @@ impl Campaign {
         } else {
             ExitCode::FAILURE
         })
+    }
+
+    /// What happens to which UAVs in a seed: what the `storm` draws, whose makespan without faults
+    /// is given, nothing where that is `calm` or `none`, or else the faults of the scenario.
+    fn faults_of(
+        &self,
+        prepared: &Prepared,
+        seed: u64,
+        free_ms: Option<u64>,
+        teller: &impl Teller,
+    ) -> (Prepared, Vec<TimedFault>) {
+        let is_calm = ["calm", "none"].contains(&self.wrong.as_str());
+        let (struck, mut faults) = if is_calm {
+            (prepared.clone(), Vec::new())
+        } else {
+            faults_of(prepared, seed, free_ms)
+        };
+        if is_calm || free_ms.is_some() {
+            faults.extend(teller.besides(prepared));
+            faults.sort_by_key(|f| f.at_ms);
+        }
+        (struck, faults)
     }
 
     /// Rules that were broken, and what happened where that is asked for.

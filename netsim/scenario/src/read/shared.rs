@@ -1,7 +1,10 @@
 //! What several readers of a scenario share: positions, the highest height, notices.
 
-use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Point};
+use crate::files::Files;
+use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point};
 use skein_interop::json::{Error, Fields, Node};
+use skein_interop::place::to_plane;
+use skein_interop::targets::{self, LineTarget, Targets};
 
 /// Highest flight level and roof that are accepted, metres: the service ceiling of
 /// small fixed wings with room to spare.
@@ -9,6 +12,30 @@ pub(crate) const MAX_HEIGHT_M: f64 = 5000.0;
 
 /// What a file told besides what was asked: field and text.
 pub(crate) type Notices = Vec<(String, String)>;
+
+/// The points, lines and areas of a file that a field names, with what that told besides.
+pub(crate) fn targets_of(
+    node: &Node<'_>,
+    files: &Files<'_>,
+    notices: &mut Notices,
+) -> Result<Targets, Error> {
+    let name = node.text()?;
+    let found =
+        targets::read(&files.read(node)?).map_err(|e| node.wrong(e.in_file(name).to_string()))?;
+    notices.extend(found.notices.iter().map(|n| {
+        let said = format!("{name}: at {}: {}", n.pointer, n.text);
+        (node.path(), said)
+    }));
+    Ok(found)
+}
+
+/// The way of a line of such a file, in the plane.
+pub(crate) fn way_of(node: &Node<'_>, origin: Origin, l: &LineTarget) -> Result<Vec<Point>, Error> {
+    let name = node.text()?;
+    let way = l.way.iter().map(|p| to_plane(origin, *p));
+    let way: Result<Vec<Point>, _> = way.collect();
+    way.map_err(|e| node.wrong(format!("{name}: at {}: {e}", l.pointer)))
+}
 
 /// A position typed as metres `east_m`, `north_m`.
 pub(crate) fn position(f: &Fields<'_>) -> Result<Point, Error> {

@@ -1,14 +1,12 @@
 //! The streets of a mission (D2.7 §3.1): `mission.streets`.
 
-use super::shared::{Notices, places, position};
+use super::shared::{Notices, places, position, targets_of, way_of};
 use super::targets::within;
 use crate::files::Files;
 use skein_flight::streets::chains::chains;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Origin, Point};
 use skein_interop::json::{Error, Fields, Node};
-use skein_interop::place::to_plane;
-use skein_interop::targets;
 use skein_peer::mission::{PointMm, mm, ring_mm};
 use skein_peer::streets::{AskedWay, INTERVAL_S, Streets, Way};
 use std::sync::Arc;
@@ -162,19 +160,10 @@ fn of_file(
     area: &Polygon,
     notices: &mut Notices,
 ) -> Result<Lines, Error> {
-    let name = node.text()?;
-    let found =
-        targets::read(&files.read(node)?).map_err(|e| node.wrong(e.in_file(name).to_string()))?;
-    notices.extend(found.notices.iter().map(|n| {
-        let said = format!("{name}: at {}: {}", n.pointer, n.text);
-        (node.path(), said)
-    }));
+    let found = targets_of(node, files, notices)?;
     let mut lines = Lines::default();
     for l in &found.lines {
-        let way = l.way.iter().map(|p| to_plane(origin, *p));
-        let way: Result<Vec<Point>, _> = way.collect();
-        let way = way.map_err(|e| node.wrong(format!("{name}: at {}: {e}", l.pointer)))?;
-        for part in within(&way, area) {
+        for part in within(&way_of(node, origin, l)?, area) {
             lines.add(l.name.as_deref().unwrap_or(NAMELESS), part);
         }
     }

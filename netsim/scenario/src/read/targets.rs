@@ -1,7 +1,7 @@
 //! What a scenario asks to see: an area, points or lines, in the plane (D2.7 §3.2, §3.4,
 //! §3.5). Leaves areas, zones and buildings themselves to `terrain`.
 
-use super::shared::{Notices, position};
+use super::shared::{Notices, position, targets_of};
 use crate::files::Files;
 use crate::request::AreaPlanner;
 use skein_flight::coverage::stations::targets::{LineTarget, PointTarget, Targets};
@@ -9,7 +9,6 @@ use skein_geometry::Polygon;
 use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Origin, Point, Vector};
 use skein_interop::json::{Error, Fields, Node};
 use skein_interop::place::{LatLon, to_plane};
-use skein_interop::targets;
 
 /// What is to be seen, in metres.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,17 +98,6 @@ struct Reader<'f> {
 }
 
 impl Reader<'_> {
-    fn file(&self, node: &Node<'_>, notices: &mut Notices) -> Result<targets::Targets, Error> {
-        let name = node.text()?;
-        let found = targets::read(&self.files.read(node)?)
-            .map_err(|e| node.wrong(e.in_file(name).to_string()))?;
-        notices.extend(found.notices.iter().map(|n| {
-            let said = format!("{name}: at {}: {}", n.pointer, n.text);
-            (node.path(), said)
-        }));
-        Ok(found)
-    }
-
     fn plane(&self, at: LatLon, name: &str, node: &Node<'_>) -> Result<Point, Error> {
         to_plane(self.origin, at).map_err(|e| node.wrong(format!("{name}: {e}")))
     }
@@ -131,7 +119,7 @@ impl Reader<'_> {
             let f = node.fields(&["file", "radius_m"])?;
             let radius_m = f.number_or("radius_m", 0.0, 0.0, WIDEST_M, "metres")?;
             let file = f.need("file", "\"points.geojson\"")?;
-            for p in self.file(file, notices)?.points {
+            for p in targets_of(file, self.files, notices)?.points {
                 let at = self.plane(p.at, &p.pointer, file)?;
                 points.push((at, p.radius_m.max(radius_m)));
             }
@@ -161,7 +149,7 @@ impl Reader<'_> {
             }
         } else {
             let file = f.need("file", "\"roads.geojson\"")?;
-            for l in self.file(file, notices)?.lines {
+            for l in targets_of(file, self.files, notices)?.lines {
                 let at = |p: &LatLon| self.plane(*p, &l.pointer, file);
                 let way = l.way.iter().map(at).collect::<Result<Vec<_>, _>>()?;
                 ways.push((way, l.width_m.max(width_m)));

@@ -1,12 +1,10 @@
 //! Vehicles on the ground of a scenario (D2.7 §1.5.2): on which roads, from where, how fast,
 //! and what they do.
 
-use super::shared::{Notices, places, position};
+use super::shared::{Notices, places, position, targets_of, way_of};
 use crate::files::Files;
 use skein_geometry::frame::{Origin, Point, Vector};
 use skein_interop::json::{Error, Fields, Node, suggestion};
-use skein_interop::place::to_plane;
-use skein_interop::targets;
 use skein_netsim::pursuit::KINDS;
 use skein_netsim::pursuit::roads::Roads;
 use skein_netsim::pursuit::vehicle::Behaviour;
@@ -197,17 +195,8 @@ fn of_file(
     notices: &mut Notices,
 ) -> Result<Roads, Error> {
     let name = node.text()?;
-    let found =
-        targets::read(&files.read(node)?).map_err(|e| node.wrong(e.in_file(name).to_string()))?;
-    notices.extend(found.notices.iter().map(|n| {
-        let said = format!("{name}: at {}: {}", n.pointer, n.text);
-        (node.path(), said)
-    }));
-    let line = |l: &targets::LineTarget| {
-        let way = l.way.iter().map(|p| to_plane(origin, *p));
-        let way: Result<Vec<Point>, _> = way.collect();
-        way.map_err(|e| node.wrong(format!("{name}: at {}: {e}", l.pointer)))
-    };
+    let found = targets_of(node, files, notices)?;
+    let line = |l| way_of(node, origin, l);
     let lines: Vec<Vec<Point>> = found.lines.iter().map(line).collect::<Result<_, _>>()?;
     Roads::of(&lines).ok_or_else(|| {
         node.wrong(format!(

@@ -33,33 +33,39 @@ impl Network {
     pub fn matched(&self, at: Point, heading: Vector, was: Option<u16>) -> Option<Matched> {
         let heading = heading.try_normalize(1e-9);
         let mut best: Option<(f64, Matched)> = None;
-        for (edge, e) in (0_u16..).zip(self.edges()) {
-            let mut before_m = 0.0;
-            for w in e.way.windows(2) {
-                let (along, length_m) = (w[1] - w[0], (w[1] - w[0]).norm());
-                if length_m <= 0.0 {
-                    continue;
-                }
-                let share = (along.dot(&(at - w[0])) / (length_m * length_m)).clamp(0.0, 1.0);
-                let aside_m = (w[0] + along * share - at).norm();
-                if aside_m <= ASIDE_M {
-                    let across = heading.map_or(0.0, |h| along.perp(&h).abs() / length_m);
-                    let stays_m = if was == Some(edge) { STAYS_M } else { 0.0 };
-                    let cost_m = aside_m + ACROSS_M * across - stays_m;
-                    if best.is_none_or(|(least_m, _)| cost_m < least_m) {
-                        let along_m = before_m + share * length_m;
-                        let matched = Matched {
-                            edge,
-                            along_m,
-                            aside_m,
-                        };
-                        best = Some((cost_m, matched));
-                    }
-                }
-                before_m += length_m;
+        for (m, along) in self.on_each_piece(at) {
+            if m.aside_m > ASIDE_M {
+                continue;
+            }
+            let across = heading.map_or(0.0, |h| along.perp(&h).abs() / along.norm());
+            let stays_m = if was == Some(m.edge) { STAYS_M } else { 0.0 };
+            let cost_m = m.aside_m + ACROSS_M * across - stays_m;
+            if best.is_none_or(|(least_m, _)| cost_m < least_m) {
+                best = Some((cost_m, m));
             }
         }
         best.map(|(_, matched)| matched)
+    }
+
+    /// The place of each straight piece of a street that is nearest, with that piece.
+    pub(super) fn on_each_piece(&self, at: Point) -> impl Iterator<Item = (Matched, Vector)> + '_ {
+        (0_u16..).zip(self.edges()).flat_map(move |(edge, e)| {
+            let mut before_m = 0.0;
+            e.way.windows(2).filter_map(move |w| {
+                let (along, length_m) = (w[1] - w[0], (w[1] - w[0]).norm());
+                if length_m <= 0.0 {
+                    return None;
+                }
+                let share = (along.dot(&(at - w[0])) / (length_m * length_m)).clamp(0.0, 1.0);
+                let matched = Matched {
+                    edge,
+                    along_m: before_m + share * length_m,
+                    aside_m: (w[0] + along * share - at).norm(),
+                };
+                before_m += length_m;
+                Some((matched, along))
+            })
+        })
     }
 }
 

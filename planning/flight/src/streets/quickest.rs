@@ -41,23 +41,9 @@ impl Network {
     #[must_use]
     pub fn nearest(&self, to: Point) -> Option<Matched> {
         let mut best: Option<Matched> = None;
-        for (edge, e) in (0_u16..).zip(self.edges()) {
-            let mut before_m = 0.0;
-            for w in e.way.windows(2) {
-                let (along, length_m) = (w[1] - w[0], (w[1] - w[0]).norm());
-                if length_m <= 0.0 {
-                    continue;
-                }
-                let share = (along.dot(&(to - w[0])) / (length_m * length_m)).clamp(0.0, 1.0);
-                let aside_m = (w[0] + along * share - to).norm();
-                if aside_m <= best.map_or(REACH_M, |b| b.aside_m) {
-                    best = Some(Matched {
-                        edge,
-                        along_m: before_m + share * length_m,
-                        aside_m,
-                    });
-                }
-                before_m += length_m;
+        for (m, _) in self.on_each_piece(to) {
+            if m.aside_m <= best.map_or(REACH_M, |b| b.aside_m) {
+                best = Some(m);
             }
         }
         best

@@ -281,6 +281,12 @@ impl Tracks {
 }
 
 impl Track {
+    /// When it was seen first, milliseconds.
+    #[must_use]
+    pub fn begun_ms(&self) -> u64 {
+        self.begun_ms
+    }
+
     /// From when it was seen first until it was seen last, milliseconds: false alarms seldom
     /// come to much.
     #[must_use]

@@ -41,8 +41,9 @@ struct Other {
     heard_ms: u64,
     /// What it flies and offers, whole.
     whole: Option<Kept>,
-    /// The version of the offer that is open, and the statement that has its motions.
-    offer: Option<(u32, Kept)>,
+    /// The version of the offer that is open, of which the whole statement has the motions, and
+    /// whether that was passed on for it.
+    offer: Option<(u32, bool)>,
     /// Its last statement that accepts anything.
     answer: Option<Kept>,
     accepts: Vec<(PeerId, u32)>,
@@ -73,11 +74,6 @@ impl Kept {
             is_passed: false,
         }
     }
-
-    fn take(&mut self) -> Record {
-        self.is_passed = true;
-        self.record.clone()
-    }
 }
 
 impl Passing {
@@ -88,8 +84,8 @@ impl Passing {
             for kept in [&mut other.whole, &mut other.answer].into_iter().flatten() {
                 kept.is_passed |= kept.record.seq == record.seq;
             }
-            if let Some((version, kept)) = &mut other.offer {
-                kept.is_passed |= gist.is_whole && gist.offers == Some(*version);
+            if let Some((version, is_passed)) = &mut other.offer {
+                *is_passed |= gist.is_whole && gist.offers == Some(*version);
             }
             return;
         }
@@ -98,10 +94,9 @@ impl Passing {
         if gist.is_whole {
             other.whole = Some(fresh());
         }
-        other.offer = match (gist.offers, other.offer.take()) {
-            (Some(version), _) if gist.is_whole => Some((version, fresh())),
-            (Some(version), Some((known, kept))) if known == version => Some((known, kept)),
-            _ => None,
+        other.offer = match gist.offers {
+            Some(version) if gist.is_whole => Some((version, false)),
+            offers => other.offer.filter(|(known, _)| Some(*known) == offers),
         };
         other.answer = (!gist.accepts.is_empty()).then(fresh);
         other.accepts = gist.accepts.to_vec();
@@ -121,8 +116,9 @@ impl Passing {
             .others
             .iter()
             .filter_map(|(id, o)| {
-                let (version, kept) = o.offer.as_ref()?;
-                Some((*id, (*version, kept.is_passed || is_late(kept))))
+                let (version, is_passed) = o.offer?;
+                let is_due = is_passed || o.whole.as_ref().is_some_and(is_late);
+                Some((*id, (version, is_due)))
             })
             .collect();
         let lacks = |id: u16, version: u32| {
@@ -138,9 +134,11 @@ impl Passing {
             .collect();
         let mut passed = Vec::new();
         for id in unanswered {
-            let offer = self.others.get_mut(&id).and_then(|o| o.offer.as_mut());
-            if let Some((_, kept)) = offer.filter(|(_, kept)| !kept.is_passed) {
-                passed.push(kept.take());
+            if let Some(other) = self.others.get_mut(&id)
+                && let (Some((_, is_passed)), Some(whole)) = (&mut other.offer, &other.whole)
+                && !core::mem::replace(is_passed, true)
+            {
+                passed.push(whole.record.clone());
             }
         }
         for other in self.others.values_mut() {
