@@ -151,6 +151,7 @@ impl Uav {
             wind_unknown: false,
             endurance_s: (airframe().endurance_s - flown_s as f64).max(0.0),
             takes_off_in_ms: 0,
+            launch_ready: false,
             failsafe: false,
             traffic: Traffic::default(),
             sightings: Sightings::default(),

@@ -557,11 +557,6 @@ const WRONG: &[(&str, &str, &str)] = &[
     ("count: 8,", "count: 0,", "fleet.count: 0 is out of range"),
     (
         "slot_step_m: 5,",
-        "separation_m: 30,",
-        "fleet.separation_m: UAVs that take off one after the other at one place need heights",
-    ),
-    (
-        "slot_step_m: 5,",
         "separation_m: 30, slot_step_m: 5,",
         "fleet.slot_step_m: UAVs with a separation_m fly at one height",
     ),

@@ -403,6 +403,9 @@ impl Executive {
 
     /// Before it takes off: it sees nothing, and plans from where it stands once it flies.
     fn on_ground(&mut self, percept: &Percept) -> Setpoint {
+        if let Some(setpoint) = self.on_launcher(percept) {
+            return setpoint;
+        }
         self.replan = true;
         self.requeue();
         let setpoint = self
@@ -425,6 +428,7 @@ impl Executive {
             steps,
             loiter: Side::Left,
             gimbal: Vec::new(),
+            launch: crate::setpoint::Launch::Stay,
         }
     }
 

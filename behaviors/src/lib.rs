@@ -35,4 +35,4 @@ pub use event::{Event, Unflyable};
 pub use executive::{Executive, Forecast, GivenFlight, Goal};
 pub use order::{Order, Orders};
 pub use percept::Percept;
-pub use setpoint::{Setpoint, Side, Steer};
+pub use setpoint::{Launch, Setpoint, Side, Steer};

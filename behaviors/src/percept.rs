@@ -31,6 +31,10 @@ pub struct Percept {
     /// Time until it takes off, milliseconds; 0 in the air.
     #[serde(default)]
     pub takes_off_in_ms: u32,
+    /// Whether it stands on its launcher, next to go, and takes off at the word of its computer
+    /// alone ([`crate::setpoint::Launch`]): not before `takes_off_in_ms`, which stays above 0.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub launch_ready: bool,
     /// Whether the airframe flies its own failsafe loiter for want of setpoints.
     pub failsafe: bool,
     /// Other UAVs that it senses.

@@ -50,6 +50,24 @@ impl GimbalStep {
 /// in tenths of a second.
 pub const MAX_GIMBAL_STEPS: usize = 16;
 
+/// What a UAV that stands ready on its launcher is told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Launch {
+    /// It has nothing to fly for: the next one may go before it.
+    #[default]
+    Stay,
+    /// It is to take off, and not yet: others who fly here are asked first.
+    Wish,
+    /// It takes off at this time, milliseconds.
+    At(u64),
+}
+
+impl Launch {
+    fn is_stay(&self) -> bool {
+        *self == Self::Stay
+    }
+}
+
 /// A command to the airframe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setpoint {
@@ -66,4 +84,7 @@ pub struct Setpoint {
     /// How a gimbal is turned from `from_ms` on; after the last one it stays. Empty without one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub gimbal: Vec<GimbalStep>,
+    /// What it is told while it stands ready to be launched; of no meaning in the air.
+    #[serde(default, skip_serializing_if = "Launch::is_stay")]
+    pub launch: Launch,
 }

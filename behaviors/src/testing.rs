@@ -44,6 +44,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         wind_unknown: false,
         endurance_s: 3000.0,
         takes_off_in_ms: 0,
+        launch_ready: false,
         failsafe: false,
         traffic: crate::traffic::Traffic::default(),
         sightings: crate::sightings::Sightings::default(),

@@ -8,7 +8,8 @@
 //!
 //! | what happens | what is flown | what is wanted |
 //! |---|---|---|
-//! | first percept in the air, or off the track | a circle from here, imposed on others | all that the goal asks for |
+//! | it stands ready to be launched | nothing | to take off on the way to its first cell |
+//! | first percept in the air without that, or off the track | a circle from here, imposed on others | all that the goal asks for |
 //! | an extension is agreed | it, then its circle | what follows it |
 //! | another goal | as before | to turn off as soon as can be, but after what both goals share |
 //! | nothing agreed until the track ends | the circle | to leave the circle, at its end or across |
@@ -23,6 +24,7 @@
 //! places at most, and a proof of clearance for each stretch.
 
 mod extensions;
+mod launcher;
 
 use super::transit::{CellVisit, Move, Place};
 use super::{Aim, Executive, Kind, Played, Stretch};
@@ -76,6 +78,10 @@ pub(super) struct Contingency {
     rest: Vec<Move>,
     /// The circle in which that ends.
     rest_arrives: Option<f64>,
+    /// Where it stands ready to be launched, and no flight from there is agreed.
+    stands: Option<Pose>,
+    /// No way from there was clear when it was looked for last.
+    held_up: bool,
 }
 
 impl Contingency {
@@ -90,6 +96,8 @@ impl Contingency {
             goals: 0,
             rest: Vec::new(),
             rest_arrives: None,
+            stands: None,
+            held_up: false,
         }
     }
 }
@@ -369,7 +377,12 @@ impl Executive {
     /// Whether there is something to ask others for: at a time, in milliseconds.
     #[must_use]
     pub fn wants_more(&self, at_ms: u64) -> bool {
-        let Some(c) = self.contingency.as_ref().filter(|c| c.schedule.is_some()) else {
+        if self.stands() {
+            return self.aim == Aim::Legs && !self.queue.is_empty();
+        }
+        // On the ground there is no place yet from which to turn off.
+        let begun = |c: &&Contingency| c.schedule.is_some_and(|(_, from_ms)| from_ms <= at_ms);
+        let Some(c) = self.contingency.as_ref().filter(begun) else {
             return false;
         };
         let at_m = self.scheduled_m(at_ms);
@@ -393,7 +406,7 @@ impl Executive {
     /// Whether it circles at a time, in milliseconds: all that was agreed is flown.
     #[must_use]
     pub fn circles(&self, at_ms: u64) -> bool {
-        self.flight_end_m() <= self.scheduled_m(at_ms)
+        !self.stands() && self.flight_end_m() <= self.scheduled_m(at_ms)
     }
 
     /// Where on the track the circle of the contingency begins, metres; the beginning of the
@@ -437,6 +450,7 @@ impl Executive {
 
     /// An extension was agreed: it is flown.
     pub fn agree(&mut self, extension: Extension) {
+        self.leave_launcher(extension.plan.start_ms);
         while self.track.end_m() < extension.cut_m {
             let Some(end) = self.stretches.back().map(|s| s.end) else {
                 return;

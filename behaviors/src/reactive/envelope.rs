@@ -378,6 +378,7 @@ mod tests {
             steps,
             loiter: Side::Left,
             gimbal: Vec::new(),
+            launch: crate::setpoint::Launch::Stay,
         }
     }
 

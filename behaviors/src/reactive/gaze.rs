@@ -161,6 +161,7 @@ mod tests {
             steps,
             loiter: Side::Left,
             gimbal: Vec::new(),
+            launch: crate::setpoint::Launch::Stay,
         }
     }
 

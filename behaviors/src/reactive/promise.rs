@@ -50,5 +50,6 @@ pub fn fly(motion: &Motion, percept: &Percept, airframe: &Airframe, height_m: f6
         steps: track.steps(offset, airspeed_mps, limit_radps),
         loiter: Side::Right,
         gimbal: Vec::new(),
+        launch: crate::setpoint::Launch::Stay,
     }
 }

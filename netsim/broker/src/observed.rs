@@ -93,6 +93,7 @@ impl Observed {
         self.tell(|o| match *fact {
             Fact::ZoneEntry { uav, zone, .. } => o.zone_entered(now_ms, uav, zone),
             Fact::Lost { uav, cause, .. } if cause != Loss::Killed => o.lost(now_ms, uav),
+            Fact::TookOff { uav, .. } => o.took_off(now_ms, uav),
             Fact::Failsafe { uav, on, .. } => o.failsafe(now_ms, uav, on),
             Fact::Lost { .. } | Fact::Seen { .. } | Fact::TooClose(_) => {}
         });

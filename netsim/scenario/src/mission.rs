@@ -155,12 +155,6 @@ fn check_separation(s: &Stated, mission: &Mission) -> Result<(), Error> {
             ),
         ));
     }
-    if s.fleet.members.iter().any(|m| m.takeoff_ms.is_some()) {
-        return Err(s.places.wrong(
-            "fleet.separation_m",
-            "UAVs that take off one after the other at one place need heights of their own; expected launch: \"spread\", or separation_m left out",
-        ));
-    }
     Ok(())
 }
 

@@ -178,6 +178,7 @@ fn launch(fleet: &Fleet, geometry: &MissionGeometry) -> Vec<UavSpec> {
             (None, None) => on_loop(i),
         },
         takeoff_ms: m.takeoff_ms.unwrap_or(0),
+        in_air: m.takeoff_ms.is_none(),
         height_m: m.height_m,
         sensors: m.sensors,
         twin_of: None,

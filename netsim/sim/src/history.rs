@@ -51,6 +51,11 @@ pub enum What {
         /// Which UAV.
         peer: u16,
     },
+    /// A UAV left its launcher, at the word of its computer.
+    TookOff {
+        /// Which UAV.
+        peer: u16,
+    },
     /// An airframe began or ceased to loiter by itself.
     Failsafe {
         /// Which UAV.

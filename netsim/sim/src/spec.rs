@@ -113,6 +113,8 @@ pub struct UavSpec {
     /// When it takes off, milliseconds; until then it stands there, its peer at work and
     /// its antenna as high as it will fly.
     pub takeoff_ms: u32,
+    /// Whether it begins in the air, at any time; else it takes off from where it stands.
+    pub in_air: bool,
     /// Its height slot above the origin, metres.
     pub height_m: f64,
     /// What it carries: a bit for each sensor, the lowest for sensor 1.

@@ -31,6 +31,7 @@ fn line(what: &What, told: &mut BTreeSet<String>) -> Option<String> {
         What::Covered => "every coverable cell is covered".to_owned(),
         What::ZoneEntry { peer, zone } => format!("peer {peer} flies into no-fly zone {zone}"),
         What::Lost { peer } => format!("the airframe of peer {peer} is lost"),
+        What::TookOff { peer } => format!("peer {peer} takes off"),
         // It follows each loss of a computer, and says no more.
         What::Failsafe { .. } => return None,
         What::Violation { check, peer, text } => format!("VIOLATION {check}{}: {text}", by(*peer)),

@@ -735,11 +735,14 @@ fn resize(spec: &mut Spec, n: usize) {
         .collect();
     let more = (1..=u16::MAX).filter(|id| !taken.contains(id));
     let like = spec.uavs.clone();
+    let at_own_heights = spec.mission.separation_mm == 0;
     let above_m = (1..).map(|k: u16| top_m + SLOT_M * f64::from(k));
     let more = more.zip(like.iter().cycle()).zip(above_m);
     let more = more.map(|((id, like), height_m)| UavSpec {
         id,
         height_m,
+        // At one height no two begin at one place in the air.
+        in_air: like.in_air && at_own_heights,
         ..like.clone()
     });
     let all: Vec<UavSpec> = like

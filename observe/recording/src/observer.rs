@@ -185,6 +185,12 @@ impl Observer {
         self.say(time_ms, Origin::World, Some(peer), text, what);
     }
 
+    /// A UAV left its launcher.
+    pub fn took_off(&mut self, time_ms: u64, peer: u16) {
+        let text = format!("{} takes off", self.name(peer));
+        self.say(time_ms, Origin::World, Some(peer), text, What::TookOff);
+    }
+
     /// An airframe began or ceased to loiter by itself.
     pub fn failsafe(&mut self, time_ms: u64, peer: u16, on: bool) {
         let does = if on {

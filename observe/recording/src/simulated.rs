@@ -109,6 +109,7 @@ impl<'a> View<'a> {
                 }
                 What::ZoneEntry { peer, zone } => observer.zone_entered(time_ms, *peer, *zone),
                 What::Lost { peer } => observer.lost(time_ms, *peer),
+                What::TookOff { peer } => observer.took_off(time_ms, *peer),
                 What::Failsafe { peer, on } => observer.failsafe(time_ms, *peer, *on),
             }
         }

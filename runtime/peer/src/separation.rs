@@ -27,7 +27,7 @@ use skein_behaviors::executive::promised::{Extension, PROMISED_MOST_S};
 use skein_behaviors::traffic::Sighting;
 use skein_behaviors::{Executive, Percept};
 use skein_flight::airframe::Airframe;
-use skein_flight::separation::{Detours, Motion};
+use skein_flight::separation::{Detours, Motion, MotionPlan};
 use std::collections::BTreeMap;
 
 /// An extension has to be agreed so long before it turns off, milliseconds: two percepts,
@@ -37,12 +37,25 @@ const GUARD_MS: u64 = 400;
 /// After a search that found nothing the next one waits for so long, milliseconds.
 const SEARCH_AGAIN_MS: u64 = 1_000;
 
+/// The same of who stands on a launcher, milliseconds. Others wait behind it; and it asks for a
+/// take-off half as far ahead as for a turn in flight: what comes of no answer in time is another
+/// second on the ground, not a circle.
+const STANDING_AGAIN_MS: u64 = 400;
+
 /// What waits for an answer is said again after so long, milliseconds.
 const SAY_AGAIN_MS: u64 = 900;
 
 /// What asks for nothing is said again with its motions after so long, milliseconds: who
 /// comes into earshot learns of it before the two can meet.
 const SAY_MS: u64 = 5_000;
+
+/// Who stands on a launcher without a clear way shows others what they hold up after so long,
+/// milliseconds: by then who has somewhere to go is gone.
+const HELD_UP_MS: u64 = 5_000;
+
+/// And again after so long, milliseconds: who makes room needs an exchange of messages and some
+/// seconds of flight.
+const PLEAD_AGAIN_MS: u64 = 10_000;
 
 /// Two statements are at least so far apart, milliseconds.
 const SAY_LEAST_MS: u64 = 200;
@@ -87,6 +100,37 @@ pub(crate) struct Separation {
     /// Since when others are believed down.
     down_since: BTreeMap<u16, Time>,
     passing: Passing,
+    line: Line,
+}
+
+/// How long it has stood without a clear way.
+#[derive(Clone, Copy, Debug, Default)]
+struct Line {
+    held_up_since_ms: Option<u64>,
+    pleaded_ms: Option<u64>,
+}
+
+impl Line {
+    /// Whether others are to be shown what they hold up.
+    fn is_due(self, now_ms: u64) -> bool {
+        let long_ms = self.held_up_since_ms.map_or(0, |since| now_ms - since);
+        let lately = self
+            .pleaded_ms
+            .is_some_and(|at| now_ms < at + PLEAD_AGAIN_MS);
+        long_ms >= HELD_UP_MS && !lately
+    }
+
+    /// It has looked for a way from where it stands.
+    fn looked(&mut self, now_ms: u64, is_clear: bool, offers: bool) {
+        if is_clear {
+            *self = Self::default();
+            return;
+        }
+        self.held_up_since_ms.get_or_insert(now_ms);
+        if offers {
+            self.pleaded_ms = Some(now_ms);
+        }
+    }
 }
 
 impl Separation {
@@ -108,6 +152,7 @@ impl Separation {
             lives: BTreeMap::new(),
             down_since: BTreeMap::new(),
             passing: Passing::default(),
+            line: Line::default(),
         }
     }
 
@@ -127,6 +172,10 @@ impl Separation {
     ) -> Effects {
         self.clocks = (now, percept.time_ms);
         let now_ms = percept.time_ms;
+        self.take_up(executive);
+        if executive.stands() {
+            self.stand(percept, executive);
+        }
         self.sense(percept);
         if executive.take_imposed() {
             self.impose(now_ms, percept, executive);
@@ -163,6 +212,23 @@ impl Separation {
         let down = |s: &&Sighting| self.down_since.contains_key(&s.id);
         let silent = traffic.seen().filter(down).map(|s| (PeerId(s.id), s.at()));
         conflicts.are_silent(silent.collect());
+    }
+
+    /// It is on the ground, and in nobody's way.
+    fn stand(&mut self, percept: &Percept, executive: &Executive) {
+        let Ok(nothing) = Motion::new(MotionPlan::on_ground(percept.time_ms, percept.pose)) else {
+            return;
+        };
+        match &mut self.conflicts {
+            Some(known) if known.in_force().has_left(percept.time_ms) => return,
+            Some(known) => {
+                known.impose(nothing);
+                self.offered = None;
+                self.is_imposed = true;
+            }
+            None => self.conflicts = Some(self.begun(percept, executive, nothing)),
+        }
+        self.flown = self.conflicts.as_ref().map_or(0, Conflicts::version);
     }
 
     fn impose(&mut self, now_ms: u64, percept: &Percept, executive: &Executive) {
@@ -237,19 +303,34 @@ impl Separation {
         let Some(conflicts) = &mut self.conflicts else {
             return;
         };
-        let lead_ms = conflicts.lead_ms() + GUARD_MS;
+        let (lead_ms, again_ms) = if executive.stands() {
+            (conflicts.lead_ms() / 2, STANDING_AGAIN_MS)
+        } else {
+            (conflicts.lead_ms() + GUARD_MS, SEARCH_AGAIN_MS)
+        };
         let until = |e: &Extension| e.branch_ms.saturating_sub(GUARD_MS);
         let wants = executive.wants_more(now_ms);
         if wants {
             let mut ways = executive.extensions(now_ms, lead_ms, is_open);
             let offers = ways.iter().map(|e| (&e.plan, until(e)));
-            if let Some(nth) = conflicts.offer(now_ms, offers, None) {
+            let clear = conflicts.offer(now_ms, offers, None);
+            let nth = if executive.stands() {
+                let offers = ways.iter().map(|e| (&e.plan, until(e)));
+                let pleads = clear.is_none() && self.line.is_due(now_ms);
+                let nth = clear.or_else(|| conflicts.plead(now_ms, offers.filter(|_| pleads)));
+                self.line.looked(now_ms, clear.is_some(), nth.is_some());
+                executive.is_held_up(nth.is_none());
+                nth
+            } else {
+                clear
+            };
+            if let Some(nth) = nth {
                 self.offered = Some(ways.swap_remove(nth));
                 self.is_news = true;
                 return;
             }
         }
-        self.search_from_ms = now_ms + SEARCH_AGAIN_MS;
+        self.search_from_ms = now_ms + again_ms;
         let of = if wants {
             InTheWay::OfThoseBefore
         } else {
@@ -271,6 +352,11 @@ impl Separation {
             return Effects::new();
         };
         let brief = conflicts.brief();
+        let asks = brief.proposal.is_some() || self.is_imposed;
+        if !asks && conflicts.in_force().has_left(now_ms) {
+            // Nobody asks who is on the ground.
+            return Effects::new();
+        }
         let whole_ms = now_ms.saturating_sub(self.said_whole.0);
         let again_ms = if brief.proposal.is_some() {
             SAY_AGAIN_MS

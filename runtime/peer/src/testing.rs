@@ -173,6 +173,7 @@ impl Seat {
             wind_unknown: false,
             endurance_s: self.fuel_s,
             takes_off_in_ms: 0,
+            launch_ready: false,
             failsafe: false,
             traffic: skein_behaviors::traffic::Traffic::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),

@@ -20,6 +20,10 @@ const PART_M: f64 = 40.0;
 /// Cells whose way is longer are flown in such parts, too, metres.
 const LONG_M: f64 = 2.0 * PART_M;
 
+/// So long before it takes off an airframe is told so, milliseconds: two percepts, of which
+/// one may be lost.
+const ROLL_MS: u64 = 400;
+
 /// What is shorter is rounding, metres.
 const SHORT_M: f64 = 1e-3;
 
@@ -47,7 +51,11 @@ impl Executive {
         self.pending.extend(events);
         let mut ways: Vec<Way> = ways.into_iter().filter(|w| !w.moves.is_empty()).collect();
         ways.sort_by(|a, b| (a.cut_m + a.idle_m).total_cmp(&(b.cut_m + b.idle_m)));
-        self.offer(&ways, at_ms)
+        // Who stands takes off then.
+        let waits_ms = self
+            .launches_in_ms()
+            .map_or(0, |least_ms| least_ms.max(lead_ms + ROLL_MS));
+        self.offer(&ways, at_ms + waits_ms)
     }
 
     /// Ways out of another UAV's way, the shortest first.
@@ -86,6 +94,10 @@ impl Executive {
     /// Where it could turn off: after what is still wanted; else as soon as can be, and
     /// where it circles also at the end of a circle.
     fn cuts(&self, at_ms: u64, lead_ms: u64) -> Vec<(f64, Place)> {
+        if let Some(pose) = self.standing_at() {
+            let boundary = None;
+            return vec![(self.track.at_m(), Place { pose, boundary })];
+        }
         let Some(c) = self.contingency.as_ref().filter(|c| c.schedule.is_some()) else {
             return Vec::new();
         };
@@ -279,7 +291,7 @@ impl Executive {
         let least = 1.0 / self.circle_radius_m();
         let sides = arrives.map_or([-least, least], |bend| [bend, -bend]);
         let from_m = self.scheduled_m(at_ms);
-        let Some(start) = self.on_track(from_m) else {
+        let Some(start) = self.standing_at().or_else(|| self.on_track(from_m)) else {
             return;
         };
         let mut flight = self.flown(from_m, way.cut_m);
@@ -297,9 +309,10 @@ impl Executive {
                 continue;
             };
             let until_s = (way.cut_m - from_m).max(0.0) / self.speed_mps();
+            let rolls_ms = if self.stands() { ROLL_MS } else { 0 };
             offered.push(Extension {
                 plan,
-                branch_ms: at_ms + whole_ms(until_s),
+                branch_ms: (at_ms + whole_ms(until_s)).saturating_sub(rolls_ms),
                 cut: way.cut,
                 cut_m: way.cut_m,
                 moves: moves.clone(),

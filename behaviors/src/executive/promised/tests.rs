@@ -1,8 +1,9 @@
 //! One UAV that flies by promises, accepted late or never.
 
 use super::*;
-use crate::Goal;
+use crate::setpoint::Launch;
 use crate::testing::{Wing, airframe, loop_and_router, rectangle};
+use crate::{Goal, Percept};
 use skein_flight::coverage::ring::Direction::Forward;
 use skein_flight::coverage::ring::backtracking::Leg;
 use skein_flight::separation::Motion;
@@ -209,6 +210,98 @@ fn a_goal_that_is_told_again_lets_what_is_agreed_stand() {
     }
     let open = flight.open.iter().filter(|o| **o).count();
     assert!(flight.done, "{open} of {n} open");
+}
+
+/// A percept of who stands where it will begin, ready to be launched.
+fn on_launcher(flight: &Flight, time_ms: u64) -> Percept {
+    Percept {
+        time_ms,
+        takes_off_in_ms: 1_000,
+        launch_ready: true,
+        ..flight.wing.percept()
+    }
+}
+
+/// Stands from a time on until its first flight is agreed, and is told to the airframe:
+/// when it takes off, milliseconds.
+fn launched(flight: &mut Flight, from_ms: u64, answered: bool) -> u64 {
+    let is_open = |_: u16| true;
+    let step = |f: &mut Flight, ms| {
+        let percept = on_launcher(f, ms);
+        f.executive.step(&percept, &is_open).0
+    };
+    assert_eq!(step(flight, from_ms).launch, Launch::Wish);
+    assert!(flight.executive.stands() && flight.executive.wants_more(from_ms));
+    assert!(!flight.executive.circles(from_ms) && !flight.executive.take_imposed());
+    let ways = flight.executive.extensions(from_ms, LEAD_MS, &is_open);
+    let way = ways.into_iter().next().unwrap();
+    let (at_ms, motion) = (way.plan.start_ms, Motion::new(way.plan.clone()).unwrap());
+    assert!(at_ms > from_ms + LEAD_MS && way.branch_ms < at_ms);
+    let begins_off_m = (motion.pose_at(at_ms).position() - flight.wing.pose.position()).norm();
+    assert!(begins_off_m < 0.01, "{begins_off_m} m");
+    if answered {
+        flight.executive.agree(way);
+        flight.in_force = Some(motion);
+        let told = step(flight, from_ms + PERCEPT_MS);
+        assert_eq!(told.launch, Launch::At(at_ms));
+        assert!(!flight.executive.wants_more(from_ms + PERCEPT_MS));
+    }
+    at_ms
+}
+
+#[test]
+fn who_is_launched_flies_what_was_agreed_from_the_ground_on() {
+    let mut flight = Flight::new(true);
+    let at_ms = launched(&mut flight, 1_000, true);
+    flight.wing.time_ms = at_ms;
+    flight.fly(1_500);
+    assert!(flight.done);
+    assert_eq!(flight.imposed, 0, "nothing is imposed on others");
+}
+
+#[test]
+fn who_missed_its_launch_asks_anew() {
+    let mut flight = Flight::new(true);
+    let at_ms = launched(&mut flight, 1_000, true);
+    let at_ms = launched(&mut flight, at_ms, false);
+    // Another goal: what was looked for is not wanted any more, and it still stands.
+    flight.legs(0, 3);
+    let at_ms = launched(&mut flight, at_ms, true);
+    flight.wing.time_ms = at_ms;
+    flight.fly(100);
+    assert!(flight.open[..3].iter().all(|open| !open) && flight.imposed == 0);
+}
+
+#[test]
+fn who_has_nothing_to_fly_for_or_is_held_up_lets_others_go_before() {
+    let mut flight = Flight::new(true);
+    let is_open = |_: u16| true;
+    let percept = on_launcher(&flight, 1_000);
+    assert_eq!(
+        flight.executive.step(&percept, &is_open).0.launch,
+        Launch::Wish
+    );
+    flight.executive.is_held_up(true);
+    assert_eq!(
+        flight.executive.step(&percept, &is_open).0.launch,
+        Launch::Stay
+    );
+    // In the line it forgets that, and looks again when it is ready.
+    let waits = Percept {
+        launch_ready: false,
+        ..percept
+    };
+    let _ = flight.executive.step(&waits, &is_open);
+    assert!(!flight.executive.stands());
+    assert_eq!(
+        flight.executive.step(&percept, &is_open).0.launch,
+        Launch::Wish
+    );
+    flight.executive.set_goal(Goal::Legs(Vec::new()), &is_open);
+    assert_eq!(
+        flight.executive.step(&percept, &is_open).0.launch,
+        Launch::Stay
+    );
 }
 
 #[test]

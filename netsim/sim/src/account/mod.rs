@@ -331,9 +331,11 @@ impl Account {
                 self.failures.push(text.clone());
                 Some(text)
             }
-            Fact::Seen { .. } | Fact::TooClose(_) | Fact::Lost { .. } | Fact::Failsafe { .. } => {
-                None
-            }
+            Fact::Seen { .. }
+            | Fact::TooClose(_)
+            | Fact::TookOff { .. }
+            | Fact::Lost { .. }
+            | Fact::Failsafe { .. } => None,
         }
     }
 

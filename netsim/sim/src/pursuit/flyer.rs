@@ -299,6 +299,7 @@ impl Flyer {
             steps,
             loiter: Side::Left,
             gimbal: Vec::new(),
+            launch: skein_behaviors::setpoint::Launch::Stay,
         };
         self.body.apply(setpoint, now_ms);
     }

@@ -69,6 +69,9 @@ impl Swarm {
             } if cause != Loss::Killed => {
                 self.history.keep(at_ms, || What::Lost { peer: uav });
             }
+            Fact::TookOff { at_ms, uav } => {
+                self.history.keep(at_ms, || What::TookOff { peer: uav });
+            }
             Fact::Failsafe { at_ms, uav, on } => {
                 self.history
                     .keep(at_ms, || What::Failsafe { peer: uav, on });

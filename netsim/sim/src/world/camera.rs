@@ -379,6 +379,7 @@ mod tests {
             from_ms: 0,
             airspeed_mps: 13.0,
             height_m: 45.0,
+            launch: skein_behaviors::Launch::Stay,
             steps: Vec::new(),
             loiter: Side::Left,
             gimbal: vec![

@@ -53,6 +53,13 @@ pub enum Fact {
         /// Where.
         place: Point,
     },
+    /// A UAV left its launcher, at the word of its computer.
+    TookOff {
+        /// When, milliseconds.
+        at_ms: u64,
+        /// Who.
+        uav: u16,
+    },
     /// An airframe began or ended to loiter on its own.
     Failsafe {
         /// When the world noticed, milliseconds.

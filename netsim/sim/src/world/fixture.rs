@@ -94,6 +94,7 @@ pub fn square(n_uavs: u16) -> Spec {
             airframe: airframe(),
             launch: ring_pose(f64::from(i) / f64::from(n_uavs.max(1))),
             takeoff_ms: 0,
+            in_air: true,
             height_m: 45.0 + 5.0 * f64::from(i),
             sensors: skein_peer::wire::tasks::CAMERA_ALONE,
             twin_of: None,

@@ -12,6 +12,7 @@ pub mod fact;
 pub mod fixture;
 pub mod flat;
 pub mod judge;
+mod launcher;
 pub mod motion;
 mod no_fly;
 pub mod obstacles;
@@ -32,6 +33,7 @@ pub use survey::{Cell, Survey, Uncoverable};
 use crate::spec::Spec;
 use crate::weather::Weather;
 use contour::Contour;
+use launcher::Launchers;
 use motion::{Kinematic, Piece};
 use skein_behaviors::traffic::{Sighting as Seen, Traffic};
 use skein_behaviors::{Percept, Setpoint};
@@ -152,6 +154,7 @@ pub struct World {
     judge: Judge,
     vehicles: Vehicles,
     weather: Weather,
+    launchers: Option<Launchers>,
     contour: Option<Contour>,
     facts: Vec<Fact>,
     flown: Vec<Piece>,
@@ -215,6 +218,10 @@ impl World {
             .with_claims(site.claims.clone())
             .with_laps(spec.mission.further_laps.saturating_add(1))
             .with_watch(spec.mission.goes_round());
+        let mut launchers = Launchers::of(spec);
+        if let Some(launchers) = &mut launchers {
+            launchers.hold(0, &mut uavs, &mut Vec::new());
+        }
         Self {
             site,
             seed,
@@ -228,6 +235,7 @@ impl World {
             judge,
             vehicles: Vehicles::new(&spec.vehicles, seed),
             weather: spec.wind.clone(),
+            launchers,
             contour: spec.contour.as_ref().map(|c| Contour::new(c, seed)),
             facts: Vec::new(),
             flown: Vec::new(),
@@ -364,13 +372,26 @@ impl World {
     /// none of another before its failsafe would trip.
     pub fn apply(&mut self, number: u16, setpoint: Setpoint) -> bool {
         let now_ms = self.now_ms;
-        let Some(u) = self.uav_mut(number) else {
+        let Some(seat) = self.seat(number) else {
+            return false;
+        };
+        let Some(u) = self.uavs.get_mut(seat) else {
             return false;
         };
         let Some(computer) = u.computer(number).copied().filter(|c| c.works) else {
             return false;
         };
         let changes = u.commander != number;
+        if u.body.takes_off_in_ms(now_ms) > 0
+            && (!changes || !u.body.is_commanded(now_ms))
+            && let Some(launchers) = &mut self.launchers
+            && let Some(u) = self.uavs.get_mut(seat)
+        {
+            launchers.tell(now_ms, u, &setpoint);
+        }
+        let Some(u) = self.uavs.get_mut(seat) else {
+            return false;
+        };
         if changes && u.body.is_commanded(now_ms) || !u.body.apply(setpoint, now_ms) {
             return false;
         }
@@ -399,6 +420,7 @@ impl World {
         Some(Percept {
             time_ms: self.now_ms,
             takes_off_in_ms: u32::try_from(ground_ms).unwrap_or(u32::MAX),
+            launch_ready: self.launchers.as_ref().is_some_and(|l| l.is_ready(uav)),
             traffic: self.traffic(uav, body.position()),
             sightings: self
                 .vehicles
@@ -449,9 +471,11 @@ impl World {
         if self.traffic_range_m <= 0.0 {
             return Traffic::default();
         }
-        let airborne = self.uavs.iter().filter(|u| {
-            u.id != uav && u.body.airborne() && u.body.takes_off_in_ms(self.now_ms) == 0
-        });
+        // Who rolls is one of them already.
+        let rolls = |id| self.launchers.as_ref().is_some_and(|l| l.rolls(id));
+        let flies = |u: &&Uav| u.body.takes_off_in_ms(self.now_ms) == 0 || rolls(u.id);
+        let others = self.uavs.iter().filter(|u| u.id != uav);
+        let airborne = others.filter(|u| u.body.airborne()).filter(flies);
         let near = airborne.map(|u| ((u.body.position() - at).norm(), u));
         let mut near: Vec<_> = near.filter(|(m, _)| *m <= self.traffic_range_m).collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -508,8 +532,12 @@ impl World {
             u.body.relaunch(now_ms);
             u.failsafe = false;
             u.commander = number;
-            let uav = u.id;
+            let (uav, launch) = (u.id, u.body.pose());
             self.judge.forget_position(uav);
+            if let Some(launchers) = &mut self.launchers {
+                launchers.join(uav, launch, now_ms);
+                launchers.hold(now_ms, &mut self.uavs, &mut self.facts);
+            }
         }
     }
 
@@ -532,6 +560,9 @@ impl World {
 
     fn step(&mut self, to_ms: u64) {
         self.airborne.clear();
+        if let Some(launchers) = &mut self.launchers {
+            launchers.hold(to_ms, &mut self.uavs, &mut self.facts);
+        }
         for u in &mut self.uavs {
             if !u.body.airborne() {
                 continue;
@@ -595,6 +626,7 @@ mod tests {
             }],
             loiter: Side::Left,
             gimbal: Vec::new(),
+            launch: skein_behaviors::setpoint::Launch::Stay,
         }
     }
 

@@ -195,6 +195,8 @@ pub enum What {
     },
     /// An airframe is gone without a fault that took it.
     Lost,
+    /// A UAV left its launcher, at the word of its computer.
+    TookOff,
     /// An airframe began or ceased to loiter by itself.
     Failsafe {
         /// Whether it began.
@@ -236,6 +238,7 @@ impl What {
             Self::Refused => "refused",
             Self::ZoneEntry { .. } => "zone_entry",
             Self::Lost => "lost",
+            Self::TookOff => "took_off",
             Self::Failsafe { .. } => "failsafe",
             Self::Violation { .. } => "violation",
             Self::Note => "note",

@@ -76,6 +76,21 @@ pub struct MotionPlan {
     pub end: End,
 }
 
+impl MotionPlan {
+    /// Of a UAV that stands on the ground there: no flight, and in nobody's way.
+    #[must_use]
+    pub fn on_ground(at_ms: u64, pose: Pose) -> Self {
+        Self {
+            start_ms: at_ms,
+            east_mm: to_signed_mm(pose.east_m),
+            north_mm: to_signed_mm(pose.north_m),
+            heading_e7: heading_e7(pose.heading_rad),
+            stretches: Vec::new(),
+            end: End::Leaves,
+        }
+    }
+}
+
 /// Why a plan is no flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum MotionError {

@@ -345,6 +345,7 @@ async fn a_percept_becomes_a_setpoint_that_answers_it() {
             steps: Vec::new(),
             loiter: Side::Left,
             gimbal: Vec::new(),
+            launch: skein_behaviors::setpoint::Launch::Stay,
         })],
         _ => Vec::new(),
     });

@@ -77,6 +77,7 @@ impl Scene {
                 attitude: None,
                 endurance_s: 3_000.0,
                 takes_off_in_ms: 0,
+                launch_ready: false,
                 failsafe: false,
                 traffic: skein_behaviors::traffic::Traffic::default(),
                 sightings: skein_behaviors::sightings::Sightings::new([]),

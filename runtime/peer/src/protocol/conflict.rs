@@ -35,6 +35,10 @@ const LEAD_FIRST_MS: u64 = 2_000;
 /// messages lost, thirty others have answered within that time nearly always.
 const LEAD_MOST_MS: u64 = 9_000;
 
+/// A flight from the ground is asked for at most so long before it begins, milliseconds: the
+/// longest lead, what is kept for two percepts, and a clock that is fast.
+const AHEAD_MOST_MS: u64 = LEAD_MOST_MS + 2_000;
+
 /// After a search without a way the next one waits for so long, milliseconds: by then
 /// others have moved by half their separation.
 const SEARCH_AGAIN_MS: u64 = 1_000;
@@ -202,7 +206,8 @@ impl Conflicts {
     /// A statement without motions. Returns whether there is something new to say.
     pub fn hear_brief(&mut self, author: PeerId, said: &Brief, now_ms: u64) -> bool {
         let _ = self.promises.hear_brief(author, said);
-        if let Some(motion) = self.promises.flown_by(author) {
+        let flown = self.promises.flown_by(author);
+        if let Some(motion) = flown.filter(|m| !m.has_left(now_ms)) {
             let at = motion.pose_at(now_ms).position();
             self.saw(author, at, now_ms);
         }
@@ -312,6 +317,24 @@ impl Conflicts {
         Some(nth)
     }
 
+    /// Offers the first of some motions though it does not keep clear, so that whoever is in
+    /// its way and has nothing to do makes room.
+    pub fn plead<'a>(
+        &mut self,
+        now_ms: u64,
+        motions: impl IntoIterator<Item = (&'a MotionPlan, u64)>,
+    ) -> Option<usize> {
+        let possible = |(nth, (plan, until_ms)): (usize, (&MotionPlan, u64))| {
+            let motion = Motion::new(plan.clone()).ok()?;
+            let off = self.keeps_off_silent(&motion, now_ms);
+            off.then_some((nth, until_ms, motion))
+        };
+        let (nth, until_ms, motion) = motions.into_iter().enumerate().find_map(possible)?;
+        self.branch_ms = until_ms;
+        self.promises.plead(motion);
+        Some(nth)
+    }
+
     /// Whether what others propose is held up by what is flown here, and by nothing else
     /// that this UAV says.
     #[must_use]
@@ -340,14 +363,17 @@ impl Conflicts {
     }
 
     /// A statement of another UAV. Returns whether there is something new to say. One that
-    /// promises what no fixed wing flies, or begins later than now, changes nothing.
+    /// promises what no fixed wing flies, or begins later than who waits for its launch says,
+    /// changes nothing.
     pub fn hear(&mut self, author: PeerId, said: &Intent, now_ms: u64) -> bool {
         let Some(statement) = received(said, now_ms) else {
             return false;
         };
-        let at = statement.in_force.motion.pose_at(now_ms).position();
+        let flown = &statement.in_force.motion;
+        let at = flown.pose_at(now_ms).position();
+        let is_up = !flown.has_left(now_ms);
         let is_newer = self.promises.hear(author, &statement);
-        if is_newer {
+        if is_newer && is_up {
             self.saw(author, at, now_ms);
         }
         // Who asks again has not heard the answer.
@@ -379,7 +405,10 @@ impl Conflicts {
             .seen
             .keys()
             .any(|id| !far.contains(id) && !is_silent(id) && !self.promises.knows(*id));
-        let may_adopt = now_ms <= self.branch_ms && !strangers;
+        // Who fell silent since it was offered has not accepted it.
+        let keeps_off = |own| self.keeps_off_silent(own, now_ms);
+        let keeps_off = self.promises.proposal().is_none_or(keeps_off);
+        let may_adopt = now_ms <= self.branch_ms && !strangers && keeps_off;
         let by_distance = self.apart.reach.is_some();
         let near = |id: PeerId| !by_distance || self.seen.contains_key(&id);
         let is_asked = |id: PeerId| near(id) && !far.contains(&id) && !is_silent(&id);
@@ -477,8 +506,8 @@ fn sent(promise: &Promise<Motion>) -> PromisedPlan {
 
 fn received(said: &Intent, now_ms: u64) -> Option<Statement<Motion>> {
     let promise = |p: &PromisedPlan| {
-        let begun = p.plan.start_ms <= now_ms;
-        let motion = Motion::new(p.plan.clone()).ok().filter(|_| begun)?;
+        let begins = p.plan.start_ms <= now_ms + AHEAD_MOST_MS;
+        let motion = Motion::new(p.plan.clone()).ok().filter(|_| begins)?;
         Some(Promise {
             version: p.version,
             motion,
@@ -595,6 +624,72 @@ mod tests {
         assert_eq!(a.in_force(), &before);
     }
 
+    /// The same on the ground, ready to fly that straight line from a time on.
+    fn on_ground(id: u16, east_m: i32, from_ms: u64) -> (Conflicts, MotionPlan) {
+        let flies = uav(id, east_m, 0, Point::new(9_000.0, 0.0));
+        let mut plan = flies.in_force().plan().clone();
+        plan.start_ms = from_ms;
+        let stands = MotionPlan::on_ground(0, flies.in_force().pose_at(0));
+        let stands = Motion::new(stands).unwrap();
+        (Conflicts::new(PeerId(id), 0, flies.apart, stands), plan)
+    }
+
+    #[test]
+    fn who_stands_is_in_nobodys_way_and_takes_off_when_those_who_fly_agree() {
+        let (mut a, _) = head_on();
+        let (mut g, plan) = on_ground(3, 0, 3_000);
+        // It has said that it stands, nobody asks it.
+        assert!(!a.hear(PeerId(3), &g.intent(), 100) || !a.is_proposing());
+        assert!(!a.seen.contains_key(&PeerId(3)));
+        g.sensed([(PeerId(1), Point::new(-600.0, 0.0))].into_iter(), 200);
+        let _ = g.hear(PeerId(1), &a.intent(), 200);
+        assert_eq!(g.offer(200, [(&plan, 2_400)], None), Some(0));
+        assert!(a.hear(PeerId(3), &g.intent(), 300), "it is accepted");
+        let _ = a.tick(400);
+        assert!(g.in_force().has_left(400));
+        assert!(g.hear(PeerId(1), &a.intent(), 500));
+        assert!(!g.in_force().has_left(500), "it takes off then");
+        // From now on it is asked like all others.
+        let _ = a.hear(PeerId(3), &g.intent(), 600);
+        assert!(a.seen.contains_key(&PeerId(3)) && a.flown_by(PeerId(3)).is_some());
+    }
+
+    #[test]
+    fn who_pleads_is_made_room_for() {
+        // It circles where another one wants to take off, with nothing to do.
+        let mut a = uav(1, -100, 0, Point::new(600.0, 0.0));
+        a.wish(None);
+        let (mut g, plan) = on_ground(3, 0, 12_000);
+        g.sensed([(PeerId(1), Point::new(0.0, 0.0))].into_iter(), 9_200);
+        let _ = g.hear(PeerId(1), &a.intent(), 9_200);
+        assert_eq!(g.offer(9_200, [(&plan, 11_400)], None), None);
+        assert!(!a.is_in_the_way(9_200, InTheWay::OfAnybody));
+        assert_eq!(g.plead(9_200, [(&plan, 11_400)]), Some(0));
+        assert!(!g.tick(9_400) && g.is_proposing(), "it stays on offer");
+        let _ = a.hear(PeerId(3), &g.intent(), 9_500);
+        assert!(a.is_in_the_way(9_500, InTheWay::OfAnybody));
+        let _ = g.hear(PeerId(1), &a.intent(), 9_600);
+        assert!(g.in_force().has_left(9_600), "and is not agreed");
+        let _ = g.tick(11_500);
+        assert!(!g.is_proposing());
+    }
+
+    #[test]
+    fn who_fell_silent_since_has_not_accepted() {
+        let (mut a, _) = head_on();
+        assert!(a.tick(0) && a.is_proposing());
+        let before = a.in_force().clone();
+        let there = [(PeerId(2), Point::new(0.0, 0.0))];
+        a.sensed(there.into_iter(), 200);
+        a.are_silent(there.into_iter().collect());
+        let _ = a.tick(400);
+        assert_eq!(a.in_force(), &before, "it circles where this would fly");
+        let aside = [(PeerId(2), Point::new(0.0, 900.0))];
+        a.are_silent(aside.into_iter().collect());
+        let _ = a.tick(600);
+        assert_ne!(a.in_force(), &before);
+    }
+
     #[test]
     fn what_cannot_be_flown_or_has_not_begun_changes_nothing() {
         let (mut a, b) = head_on();
@@ -605,7 +700,7 @@ mod tests {
         assert!(!a.hear(PeerId(2), &said, 100));
         let mut said = b.intent();
         said.number = 7;
-        said.in_force.plan.start_ms = 5_000;
+        said.in_force.plan.start_ms = 12_000;
         assert!(!a.hear(PeerId(2), &said, 100));
         assert_eq!(a.intent(), before);
     }

@@ -12,7 +12,8 @@
 //! | flying | a wish ([`Promises::propose`]) | proposing | the proposal |
 //! | proposing | all others accept | flying the proposal | the new motion in force |
 //! | proposing | withdrawn by the caller, for time | flying | that it is withdrawn |
-//! | proposing | it conflicts with what stands, or with a proposal that goes before | flying | that it is withdrawn |
+//! | proposing, not pleading | it conflicts with what stands, or with a proposal that goes before | flying | that it is withdrawn |
+//! | flying | a wish that conflicts with what others fly ([`Promises::plead`]) | proposing | the proposal, which they may make room for |
 //! | any | a proposal that keeps apart from the motion in force and the own proposal | same | that it is accepted |
 //! | proposing | a proposal that goes before the own and conflicts with it alone | flying | the own is withdrawn, the other accepted |
 //! | any | a proposal that conflicts with the motion in force, or goes behind | same | nothing |
@@ -118,6 +119,8 @@ pub struct Promises<M> {
     last_version: u32,
     in_force: Promise<M>,
     proposal: Option<Promise<M>>,
+    /// What is on offer is known to conflict with what another flies, who is to make room.
+    pleads: bool,
     others: BTreeMap<PeerId, Other<M>>,
 }
 
@@ -152,6 +155,7 @@ impl<M: Clone> Promises<M> {
                 motion: in_force,
             },
             proposal: None,
+            pleads: false,
             others: BTreeMap::new(),
         }
     }
@@ -315,19 +319,28 @@ impl<M: Clone> Promises<M> {
         self.in_force.version
     }
 
-    /// Forgets those who can meet nobody any more.
+    /// Forgets those who can meet nobody any more, and do not ask to.
     pub fn forget(&mut self, is_gone: impl Fn(&M) -> bool) {
-        self.others.retain(|_, o| !is_gone(&o.in_force.motion));
+        let stays = |o: &Other<M>| o.proposal.is_some() || !is_gone(&o.in_force.motion);
+        self.others.retain(|_, o| stays(o));
     }
 
     /// Offers a motion in place of that in force.
     pub fn propose(&mut self, motion: M) {
         self.last_version += 1;
         self.number += 1;
+        self.pleads = false;
         self.proposal = Some(Promise {
             version: self.last_version,
             motion,
         });
+    }
+
+    /// The same of one that conflicts with what others fly: it shows them what they hold up,
+    /// and is adopted if they make room for it.
+    pub fn plead(&mut self, motion: M) {
+        self.propose(motion);
+        self.pleads = true;
     }
 
     /// Withdraws the own proposal, if there is one; says whether.
@@ -348,6 +361,7 @@ impl<M: Clone> Promises<M> {
     ) -> Settled {
         let mut settled = Settled::default();
         if let Some(own) = &self.proposal
+            && !self.pleads
             && !self.is_clear(&own.motion, apart)
         {
             self.proposal = None;

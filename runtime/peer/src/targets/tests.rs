@@ -32,6 +32,7 @@ fn percept(now_ms: u64, at: Point, seen: &[(f64, f64, u8)]) -> Percept {
         wind_unknown: false,
         endurance_s: 1_000.0,
         takes_off_in_ms: 0,
+        launch_ready: false,
         failsafe: false,
         traffic: skein_behaviors::traffic::Traffic::default(),
     }

@@ -175,11 +175,16 @@ impl Kinematic {
     /// The same, on the ground until it takes off.
     #[must_use]
     pub fn taking_off_at(mut self, takeoff_ms: u64) -> Self {
-        self.now_ms = self.now_ms.max(takeoff_ms);
+        self.stand_until(self.now_ms.max(takeoff_ms));
+        self
+    }
+
+    /// On the ground still, it takes off then.
+    pub fn stand_until(&mut self, takeoff_ms: u64) {
+        self.now_ms = takeoff_ms;
         self.leg.from_ms = self.now_ms;
         self.leg.to_ms = self.now_ms;
         self.fresh_until_ms = self.now_ms + FAILSAFE_MS;
-        self
     }
 
     /// Time until it takes off, milliseconds; 0 in the air.
@@ -287,6 +292,7 @@ impl Kinematic {
             wind_unknown: false,
             endurance_s: seconds(self.fuel_ms),
             takes_off_in_ms: 0,
+            launch_ready: false,
             failsafe: self.failsafe,
             traffic: skein_behaviors::traffic::Traffic::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
@@ -536,6 +542,7 @@ mod tests {
                 .collect(),
             loiter: Side::Right,
             gimbal: Vec::new(),
+            launch: skein_behaviors::setpoint::Launch::Stay,
         }
     }
 
