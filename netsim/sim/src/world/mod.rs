@@ -12,6 +12,7 @@ pub mod fact;
 pub mod fixture;
 pub mod flat;
 pub mod judge;
+mod layers;
 pub mod motion;
 mod no_fly;
 pub mod obstacles;
@@ -24,6 +25,7 @@ mod watch;
 
 pub use fact::{Approach, Fact};
 pub use judge::{Judge, Sighting};
+pub use layers::LayerSeen;
 pub use motion::kinematic::Loss;
 pub use no_fly::TurnAway;
 pub use obstacles::{Obstacles, Place};
@@ -459,6 +461,7 @@ impl World {
             id: u.id,
             east_dm: mm(u.body.position().x) / 100,
             north_dm: mm(u.body.position().y) / 100,
+            height_dm: mm(u.body.height_m()) / 100,
         };
         Traffic::new(self.traffic_range_m, near.into_iter().map(sighting))
     }

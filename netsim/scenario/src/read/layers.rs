@@ -1,0 +1,134 @@
+//! The layers of a mission (D2.7 §1.2.2): `mission.layers_m`, and what a fleet needs to fly them.
+//! Whether their heights leave room for each other is the mission's own check.
+
+use super::Stated;
+use super::fleet::Fleet;
+use super::shared::MAX_HEIGHT_M;
+use super::targets::Asked;
+use crate::request::AreaPlanner;
+use skein_interop::json::{Error, Node};
+use skein_netsim::spec::StormSpec;
+use skein_peer::Mission;
+use skein_peer::layers::{LAYERS_MAX, Layers};
+use std::sync::Arc;
+
+/// How far UAVs sense each other, as a share of what they need to.
+const SENSED: f64 = 1.25;
+
+/// Reads `mission.layers_m`: heights above home, rising, the first of them the flight level.
+pub(crate) fn of_mission(mission: &Node<'_>, level_m: f64) -> Result<Vec<f64>, Error> {
+    let Some(list) = mission.get("layers_m")? else {
+        return Ok(Vec::new());
+    };
+    let items = list.items()?;
+    if items.is_empty() || items.len() > LAYERS_MAX {
+        return Err(list.wrong(format!(
+            "has {} layers; expected 1 to {LAYERS_MAX}, or the field left out where all is flown at level_m",
+            items.len()
+        )));
+    }
+    let mut heights: Vec<f64> = Vec::with_capacity(items.len());
+    for item in &items {
+        let height_m = item.number(0.0, MAX_HEIGHT_M, "metres above home")?;
+        match heights.last() {
+            None if (height_m - level_m).abs() > 1e-9 => {
+                return Err(item.wrong(format!(
+                    "the lowest layer is the flight level, from which the camera's footprint is reckoned; expected {level_m}, or level_m: {height_m}"
+                )));
+            }
+            Some(below_m) if height_m <= *below_m => {
+                return Err(item.wrong(format!(
+                    "{height_m} m are not above the layer before, at {below_m} m; expected rising heights"
+                )));
+            }
+            _ => heights.push(height_m),
+        }
+    }
+    Ok(heights)
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturates, and readers limit it"
+)]
+fn mm(m: f64) -> u32 {
+    (m * 1000.0).round() as u32
+}
+
+/// The layers of the mission; none where all is flown at one height.
+pub(crate) fn of_fleet(heights_m: &[f64], fleet: &Fleet) -> Option<Arc<Layers>> {
+    let fastest = fleet.members.iter().map(|m| m.airframe.max_mps);
+    (!heights_m.is_empty()).then(|| {
+        Arc::new(Layers {
+            heights_mm: heights_m.iter().copied().map(mm).collect(),
+            slot_mm: mm(fleet.slot_step_m),
+            slots: u16::try_from(fleet.members.len()).unwrap_or(u16::MAX),
+            fastest_mmps: mm(fastest.fold(0.0, f64::max)),
+        })
+    })
+}
+
+/// In how many laps everything is seen that often: each goes through all layers.
+pub(crate) fn laps(s: &Stated) -> Result<u16, Error> {
+    let layers = u16::try_from(s.layers_m.len().max(1)).unwrap_or(u16::MAX);
+    s.laps.checked_mul(layers).ok_or_else(|| {
+        let text = format!("{} laps through {layers} layers are too many", s.laps);
+        s.places.wrong("laps", text)
+    })
+}
+
+/// What flying in layers asks for besides the layers themselves.
+pub(crate) fn check(s: &Stated, mission: &Mission) -> Result<(), Error> {
+    let Some(layers) = &mission.layers else {
+        return Ok(());
+    };
+    let wrong = |field: &str, text: String| Err(s.places.wrong(field, text));
+    if s.fleet.separation_m > 0.0 {
+        let text = "UAVs that keep apart at one height cannot fly in layers; leave it out, so that each has a slot in each layer";
+        return wrong("fleet.separation_m", text.into());
+    }
+    if s.asked != Asked::Area(AreaPlanner::Lanes) {
+        let text = "an area in lanes is flown in layers; expected an area, and planner: \"lanes\"";
+        return wrong("mission.layers_m", text.into());
+    }
+    let slots = s.fleet.members.iter().enumerate();
+    let slot_m = |i: usize| s.terrain.level_m + s.fleet.slot_step_m * i as f64;
+    let mut elsewhere = slots.filter(|(i, m)| (m.height_m - slot_m(*i)).abs() > 1e-6);
+    if let Some((i, member)) = elsewhere.next() {
+        let text = format!(
+            "UAV {} has a slot of its own in each layer, {} m above its lowest; leave its height_m out",
+            member.id,
+            s.fleet.slot_step_m * i as f64
+        );
+        return wrong(&format!("fleet.uavs[{i}].height_m"), text);
+    }
+    let kept_m = s.fleet.slot_step_m / 2.0;
+    if s.run.min_separation_m > kept_m {
+        let text = format!(
+            "who changes layers passes others by half a slot, {kept_m} m; expected no more, or a larger fleet.slot_step_m"
+        );
+        return wrong("checks.min_separation_m", text);
+    }
+    match layers.check().and_then(|()| mission.check_layers()) {
+        Ok(()) => Ok(()),
+        Err(text) => wrong("mission.layers_m", text),
+    }
+}
+
+/// How far UAVs sense each other that change layers past each other, metres.
+pub(crate) fn traffic_range_m(s: &Stated, layers: &Layers) -> f64 {
+    let slots = layers.slots();
+    let members = s.fleet.members.iter();
+    let clear = members.map(|m| slots.clear_m(m.airframe.climb_mps, layers.fastest_mps()));
+    (SENSED * clear.fold(0.0, f64::max)).ceil()
+}
+
+/// The storm of a scenario: in layers there is a slot for each UAV of the fleet, and for no more.
+pub(crate) fn storm(s: &Stated) -> StormSpec {
+    let mut storm = s.storm;
+    if !s.layers_m.is_empty() {
+        (storm.troubles.max_uavs, storm.troubles.max_crowd) = (0, 0);
+    }
+    storm
+}
