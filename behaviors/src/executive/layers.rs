@@ -6,6 +6,7 @@
 //! | within its layer | are seen and flown | as the goal says |
 //! | on the way to it | are not seen, whatever is in the picture | for legs: to a circle where they begin |
 //! | held up there by others for [`PATIENCE_MS`] | likewise | on along the loop, where others are |
+//! | at a height at which another one stays near by | likewise | a circle where it is |
 //!
 //! Which height comes next is the reactive layer's (`reactive::climb`).
 
@@ -30,6 +31,8 @@ pub(super) struct Layered {
     stays_since_ms: u64,
     /// Whether it flies on since it was held up.
     is_held_up: bool,
+    /// Whether it has to circle where it is, since another one near by stays at its height.
+    shares: bool,
 }
 
 impl Executive {
@@ -42,6 +45,7 @@ impl Executive {
             is_there: false,
             stays_since_ms: 0,
             is_held_up: false,
+            shares: false,
         });
         self
     }
@@ -74,13 +78,16 @@ impl Executive {
         if !percept.height_m.is_finite() {
             return;
         }
-        self.height_m = layered.climb.next_m(percept);
+        self.height_m = layered.climb.next_m(percept, self.aim == Aim::Legs);
+        let shared = core::mem::replace(&mut layered.shares, layered.climb.shares(percept));
         let moves = (self.height_m - percept.height_m).abs() > 0.1;
         if moves || layered.stays_since_ms == 0 {
             layered.stays_since_ms = percept.time_ms;
         }
         layered.height_m = percept.height_m;
         let was = (layered.is_there, layered.is_held_up);
+        // It circles from here on.
+        self.replan |= !was.0 && layered.shares && !shared;
         layered.is_there = layered.climb.is_in_layer(percept.height_m);
         let stays_ms = percept.time_ms.saturating_sub(layered.stays_since_ms);
         // Once it flies on it does so until it is there: who circles is met again.
@@ -110,6 +117,9 @@ impl Executive {
         let layered = self.layered.as_ref().filter(|l| !l.is_there)?;
         if !matches!(self.aim, Aim::Legs | Aim::Detour) {
             return None;
+        }
+        if layered.shares {
+            return Some(self.transit.way_to_loiter(at));
         }
         if layered.is_held_up
             && let Some(moves) = self.transit.way_round(at)

@@ -3,30 +3,32 @@
 //!
 //! In each layer each UAV has a slot of its own, so many of them one above the other. A UAV that
 //! changes layers goes from one *rest* to the next: its own slots, and the heights half-way
-//! between two slots, where nobody cruises. Nobody agrees on anything: it goes on when those
-//! whom it senses leave it the room.
+//! between two slots, where nobody cruises and one at a time may stay. Nobody agrees on anything:
+//! it goes on when those whom it senses leave it the room.
 //!
-//! | another UAV that is sensed | from a rest to the next |
+//! | another UAV that is sensed | from a rest to one beyond it |
 //! |---|---|
-//! | is so far away that it cannot come near before the next rest is reached | goes |
-//! | is at least half a slot below or above all of the way | goes |
-//! | has a lower number and is less than half a slot and one way between two rests beyond its end | waits |
-//! | is nearer | waits |
-//! | may be there unseen: there is no sensor, or it reads no more than it can hold | waits |
+//! | between them in height, or less than half a slot beyond, and so near that it could come there meanwhile | stays |
+//! | at the height of that rest, however far away | the one after it, two beyond at most |
+//! | between them and no cruiser, for less than [`STUCK_MS`] | stays: it may go there, too |
+//! | likewise, up to three ways beyond that rest and of a lower number; or behind who leaves its own slot | stays |
+//! | whoever may be there unseen: there is no sensor, or it holds no more | stays |
+//! | any other | goes |
 //!
 //! # Guarantees
 //! Of UAVs that follow this law with the same slots, sense each other without delay and climb at
 //! no less than they say, any two are half a slot apart in height or farther apart on the ground
-//! than they can approach each other meanwhile: whoever begins later sees where the other is,
-//! each goes no farther than the next rest before it looks again, and of two who begin at once the one
-//! with the higher number leaves room for all that the other may do. Who flies at its own slot
-//! yields to nobody.
+//! than they can approach each other meanwhile: who cruises keeps its slot, who passes a slot
+//! does so where its owner is not, and no two stay at one rest. Of two who begin at once for one
+//! rest one waits: who is behind, who leaves its slot, or who has the higher number. Who was
+//! taken for stuck and was not may come to the rest of another: see [`Climb::shares`].
 //!
 //! # Complexity
-//! A few comparisons for each UAV that is sensed, and one for each slot between two rests.
+//! A few comparisons for each UAV that is sensed, and one for each slot.
 
 use crate::percept::Percept;
 use crate::traffic::Sighting;
+use std::collections::BTreeMap;
 
 /// Nearer than this to a height a UAV is at it, metres.
 pub const AT_M: f64 = 0.5;
@@ -34,6 +36,18 @@ pub const AT_M: f64 = 0.5;
 /// So long after a percept what it says may still be acted on, seconds: setpoints are refused
 /// later.
 const LATE_S: f64 = 1.0;
+
+/// Who keeps a slot for so long cruises there, milliseconds: who passes one does not stay.
+const CRUISES_MS: u64 = 1_000;
+
+/// Who keeps another height for so long is stuck there, milliseconds: others go past.
+pub const STUCK_MS: u64 = 20_000;
+
+/// Of so many rests ahead the first that is free is taken.
+const LOOKS_AHEAD: usize = 3;
+
+/// Nearer than this two that stay at one height circle where they are, metres.
+const SHARED_M: f64 = 300.0;
 
 /// The heights at which a fleet flies a volume.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,6 +74,10 @@ pub struct Climb {
     climb_mps: f64,
     /// The fastest of the fleet, m/s.
     fastest_mps: f64,
+    /// To which rest it is on its way, metres.
+    to_m: Option<f64>,
+    /// At which height others are, decimetres, and since when, milliseconds.
+    others: BTreeMap<u16, (i32, u64)>,
 }
 
 impl Slots {
@@ -71,12 +89,13 @@ impl Slots {
         Some((low_m - beyond_m, high_m + beyond_m))
     }
 
-    /// How far around it a UAV has to see nobody between two rests, metres, where it climbs at
-    /// this rate.
-    #[must_use]
-    pub fn clear_m(&self, climb_mps: f64, fastest_mps: f64) -> f64 {
-        let takes_s = self.stride_m() / climb_mps.max(0.1) + LATE_S;
-        self.step_m + 2.0 * fastest_mps * takes_s
+    /// The height of each slot, metres.
+    fn all_m(&self) -> impl Iterator<Item = f64> + '_ {
+        let of = move |low_m: &f64| {
+            let low_m = *low_m;
+            (0..self.count).map(move |k| low_m + self.step_m * f64::from(k))
+        };
+        self.layers_m.iter().flat_map(of)
     }
 
     /// The longest way from one rest to the next, metres.
@@ -127,19 +146,36 @@ impl Slots {
     }
 }
 
+/// What others leave of a way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Room {
+    Free,
+    /// Somebody is at its end.
+    Taken,
+    /// Somebody is too near, or may go there.
+    Wait,
+}
+
 impl Climb {
     /// The way of the UAV with this number to its slot in a layer; `offset_m` is how far its
-    /// slot is above the lowest of each layer.
+    /// slot is above the lowest of each layer; the speeds are how fast it climbs and how fast the
+    /// fastest of the fleet flies, m/s.
     #[must_use]
-    pub fn new(slots: Slots, (id, offset_m): (u16, f64), layer: usize, speeds_mps: (f64, f64)) -> Self {
-        let (climb_mps, fastest_mps) = speeds_mps;
+    pub fn new(
+        slots: Slots,
+        (id, offset_m): (u16, f64),
+        layer: usize,
+        (climb_mps, fastest_mps): (f64, f64),
+    ) -> Self {
         Self {
             layer: layer.min(slots.layers_m.len().saturating_sub(1)),
             slots,
             id,
             offset_m,
-            climb_mps,
+            climb_mps: climb_mps.max(0.1),
             fastest_mps,
+            to_m: None,
+            others: BTreeMap::new(),
         }
     }
 
@@ -163,28 +199,78 @@ impl Climb {
         if self.is_in_layer(height_m) {
             return 0.0;
         }
-        (self.slot_m() - height_m).abs() / self.climb_mps.max(0.1)
+        (self.slot_m() - height_m).abs() / self.climb_mps
     }
 
-    /// The height to fly to now, metres above the origin: the next rest, or where it is.
+    /// Within which distance nobody may be on a way of so many metres up or down, metres.
     #[must_use]
-    pub fn next_m(&self, percept: &Percept) -> f64 {
-        let (at_m, to_m) = (percept.height_m, self.slot_m());
-        if (at_m - to_m).abs() <= AT_M {
+    pub fn clear_m(&self, way_m: f64) -> f64 {
+        let takes_s = way_m.abs() / self.climb_mps + LATE_S;
+        self.slots.step_m + 2.0 * self.fastest_mps * takes_s
+    }
+
+    /// Whether another one that stays at its height is so near that both have to circle where
+    /// they are.
+    #[must_use]
+    pub fn shares(&self, percept: &Percept) -> bool {
+        let here = percept.pose.position();
+        percept.traffic.seen().any(|s| {
+            let apart_m = (s.height_m() - percept.height_m).abs();
+            apart_m < self.apart_m() && (s.at() - here).norm() <= SHARED_M
+        })
+    }
+
+    /// The height to fly to now, metres above the origin: a rest, or where it is. It descends
+    /// only where it `may`.
+    #[must_use]
+    pub fn next_m(&mut self, percept: &Percept, may_descend: bool) -> f64 {
+        self.note_others(percept);
+        let (at_m, slot_m) = (percept.height_m, self.slot_m());
+        let is_at = |to_m: f64| (at_m - to_m).abs() <= AT_M;
+        if is_at(slot_m) {
+            self.to_m = None;
+            return slot_m;
+        }
+        // Between two rests it goes on: it looked before it began.
+        if let Some(to_m) = self.to_m.filter(|to| !is_at(*to)) {
             return to_m;
         }
-        let rests = self.rests_m();
-        let upwards = to_m > at_m;
-        let resting = rests.iter().copied().find(|r| (r - at_m).abs() <= AT_M);
-        let beyond = |r: &f64| if upwards { *r > at_m + AT_M } else { *r < at_m - AT_M };
-        let mut next = rests.iter().copied().filter(beyond);
-        let next_m = if upwards { next.next() } else { next.next_back() };
-        let next_m = next_m.unwrap_or(to_m);
-        match resting {
-            // Between two rests it goes on: it looked before it began.
-            Some(rest_m) if !self.has_room(percept, rest_m, next_m) => rest_m,
-            _ => next_m,
+        let upwards = slot_m > at_m;
+        let mut rests = self.rests_m();
+        if !upwards {
+            rests.reverse();
         }
+        let resting = rests.iter().position(|r| is_at(*r));
+        let beyond = |r: &f64| if upwards { *r > at_m } else { *r < at_m };
+        let Some(resting) = resting else {
+            let next_m = rests.iter().copied().find(beyond);
+            let next_m = next_m.filter(|_| upwards || may_descend).unwrap_or(at_m);
+            self.to_m = Some(next_m);
+            return next_m;
+        };
+        let rest_m = rests[resting];
+        self.to_m = Some(rest_m);
+        if !upwards && !may_descend {
+            return rest_m;
+        }
+        let within = |r: &&f64| if upwards { **r <= slot_m } else { **r >= slot_m };
+        let ahead = rests[resting + 1..].iter().take_while(within);
+        for to_m in ahead.take(LOOKS_AHEAD) {
+            match self.room(percept, rest_m, *to_m) {
+                Room::Free => {
+                    self.to_m = Some(*to_m);
+                    return *to_m;
+                }
+                Room::Taken => {}
+                Room::Wait => break,
+            }
+        }
+        rest_m
+    }
+
+    /// Less than this in height keeps nobody apart, metres: whoever rests half a slot away does.
+    fn apart_m(&self) -> f64 {
+        (self.slots.step_m - AT_M) / 2.0
     }
 
     /// Where it may stay while others pass, ascending: half-way between two slots, and its own.
@@ -196,29 +282,71 @@ impl Climb {
         rests
     }
 
-    /// Whether those who are sensed leave it the way from a rest to the next.
-    fn has_room(&self, percept: &Percept, from_m: f64, to_m: f64) -> bool {
+    fn note_others(&mut self, percept: &Percept) {
+        let now_ms = percept.time_ms;
+        let seen = |id: &u16| percept.traffic.seen().any(|s| s.id == *id);
+        self.others.retain(|id, _| seen(id));
+        for s in percept.traffic.seen() {
+            let known = self.others.entry(s.id).or_insert((s.height_dm, now_ms));
+            if known.0.abs_diff(s.height_dm) > 1 {
+                *known = (s.height_dm, now_ms);
+            }
+        }
+    }
+
+    /// What those who are sensed leave of the way from a rest to another.
+    fn room(&self, percept: &Percept, from_m: f64, to_m: f64) -> Room {
         let traffic = &percept.traffic;
-        let clear_m = self.slots.clear_m(self.climb_mps, self.fastest_mps);
-        if traffic.range_m < clear_m {
-            return false;
+        let clear_m = self.clear_m(to_m - from_m);
+        let (stride_m, apart_m) = (self.slots.stride_m(), self.apart_m());
+        let contended_m = LOOKS_AHEAD as f64 * stride_m + apart_m;
+        if traffic.range_m < clear_m || self.may_hide(percept, contended_m + stride_m) {
+            return Room::Wait;
         }
         let here = percept.pose.position();
-        let is_near = |s: &&Sighting| (s.at() - here).norm() <= clear_m;
-        // Beyond the last one that it holds there may be others as near.
-        if traffic.is_full() && traffic.seen().all(|s| is_near(&s)) {
-            return false;
+        let side = if to_m > from_m { 1.0 } else { -1.0 };
+        let leaves_slot = self.slots.all_m().any(|s| (s - from_m).abs() <= AT_M);
+        let mut room = Room::Free;
+        for other in traffic.seen() {
+            // How far beyond its end, and behind its beginning.
+            let beyond_m = side * (other.height_m() - to_m);
+            let behind_m = side * (from_m - other.height_m());
+            let is_on_it = beyond_m < apart_m && behind_m < apart_m;
+            if is_on_it && (other.at() - here).norm() <= clear_m {
+                return Room::Wait;
+            }
+            if beyond_m.abs() < apart_m {
+                room = Room::Taken;
+                continue;
+            }
+            if !self.may_come(other, percept.time_ms) {
+                continue;
+            }
+            let is_between = beyond_m < 0.0 && behind_m < 0.0;
+            let comes_against = beyond_m > 0.0 && beyond_m < contended_m && other.id < self.id;
+            let comes_after = leaves_slot && behind_m >= 0.0 && behind_m < contended_m;
+            if is_between || comes_against || comes_after {
+                return Room::Wait;
+            }
         }
-        let (step_m, stride_m) = (self.slots.step_m, self.slots.stride_m());
-        let (low_m, high_m) = (from_m.min(to_m), from_m.max(to_m));
-        let upwards = to_m > from_m;
-        traffic.seen().filter(is_near).all(|other| {
-            let ahead_m = if other.id < self.id { stride_m } else { 0.0 };
-            let (below_m, above_m) = if upwards { (0.0, ahead_m) } else { (ahead_m, 0.0) };
-            // A slot is half a step from where a rest is: who is there keeps enough.
-            let apart_m = step_m / 2.0 - AT_M / 2.0;
-            let height_m = other.height_m();
-            height_m <= low_m - apart_m - below_m || height_m >= high_m + apart_m + above_m
-        })
+        room
+    }
+
+    /// Whether somebody may be within so many metres of its height whom the sensor does not hold.
+    fn may_hide(&self, percept: &Percept, within_m: f64) -> bool {
+        let heights = percept.traffic.seen().map(Sighting::height_m);
+        let farthest_m = heights.map(|h| (h - percept.height_m).abs());
+        percept.traffic.is_full() && farthest_m.fold(0.0, f64::max) < within_m
+    }
+
+    /// Whether another one may be about to change its height: it neither cruises nor is stuck.
+    fn may_come(&self, other: &Sighting, now_ms: u64) -> bool {
+        let since_ms = self.others.get(&other.id).map_or(now_ms, |o| o.1);
+        let stays_ms = now_ms.saturating_sub(since_ms);
+        let is_at_slot = || {
+            let mut slots = self.slots.all_m();
+            slots.any(|s| (s - other.height_m()).abs() <= AT_M)
+        };
+        stays_ms < STUCK_MS && !(stays_ms >= CRUISES_MS && is_at_slot())
     }
 }

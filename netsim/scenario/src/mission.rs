@@ -128,8 +128,8 @@ fn turning(s: &Stated) -> Result<f64, Error> {
 /// How far UAVs sense each other, metres: what is stated, or what flying at one height asks
 /// for.
 pub(crate) fn traffic_range_m(s: &Stated, mission: &Mission) -> f64 {
-    if let Some(layers) = &mission.layers {
-        return layers::traffic_range_m(s, layers);
+    if mission.layers.is_some() {
+        return layers::SENSED_M;
     }
     if s.fleet.separation_m <= 0.0 {
         return 0.0;

@@ -12,8 +12,9 @@ use skein_peer::Mission;
 use skein_peer::layers::{LAYERS_MAX, Layers};
 use std::sync::Arc;
 
-/// How far UAVs sense each other, as a share of what they need to.
-const SENSED: f64 = 1.25;
+/// How far UAVs that fly in layers sense each other, metres: transponders are received for some
+/// kilometres.
+pub(crate) const SENSED_M: f64 = 5_000.0;
 
 /// Reads `mission.layers_m`: heights above home, rising, the first of them the flight level.
 pub(crate) fn of_mission(mission: &Node<'_>, level_m: f64) -> Result<Vec<f64>, Error> {
@@ -114,14 +115,6 @@ pub(crate) fn check(s: &Stated, mission: &Mission) -> Result<(), Error> {
         Ok(()) => Ok(()),
         Err(text) => wrong("mission.layers_m", text),
     }
-}
-
-/// How far UAVs sense each other that change layers past each other, metres.
-pub(crate) fn traffic_range_m(s: &Stated, layers: &Layers) -> f64 {
-    let slots = layers.slots();
-    let members = s.fleet.members.iter();
-    let clear = members.map(|m| slots.clear_m(m.airframe.climb_mps, layers.fastest_mps()));
-    (SENSED * clear.fold(0.0, f64::max)).ceil()
 }
 
 /// The storm of a scenario: in layers there is a slot for each UAV of the fleet, and for no more.

@@ -456,7 +456,13 @@ impl World {
         });
         let near = airborne.map(|u| ((u.body.position() - at).norm(), u));
         let mut near: Vec<_> = near.filter(|(m, _)| *m <= self.traffic_range_m).collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Who changes layers has to know of all that are about as high; else the nearest count.
+        let high_m = self.body(uav).map_or(0.0, Kinematic::height_m);
+        let key = |(away_m, u): &(f64, &Uav)| match self.judge.survey().layers() {
+            Some(_) => (u.body.height_m() - high_m).abs(),
+            None => *away_m,
+        };
+        near.sort_by(|a, b| key(a).total_cmp(&key(b)));
         let sighting = |(_, u): (f64, &Uav)| Seen {
             id: u.id,
             east_dm: mm(u.body.position().x) / 100,
