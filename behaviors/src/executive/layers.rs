@@ -136,3 +136,159 @@ impl Executive {
         Some(way.unwrap_or_else(|| self.transit.way_to_loiter(at)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::event::Event;
+    use crate::executive::{Executive, Goal};
+    use crate::percept::Percept;
+    use crate::reactive::climb::{Climb, STUCK_MS, Slots};
+    use crate::testing::{Wing, airframe, loop_and_router};
+    use crate::traffic::{Sighting, Traffic};
+    use skein_flight::coverage::ring::Direction;
+    use skein_flight::coverage::ring::backtracking::Leg;
+    use skein_geometry::frame::{Point, Pose};
+
+    struct Flight {
+        executive: Executive,
+        wing: Wing,
+        height_m: f64,
+        open: Vec<bool>,
+        /// At which heights cells were seen, metres.
+        seen_m: Vec<f64>,
+        refused: usize,
+    }
+
+    impl Flight {
+        /// The UAV with number 2 of four, in the first of two layers, with legs in the second.
+        fn new() -> Self {
+            let slots = Slots {
+                layers_m: vec![60.0, 100.0],
+                step_m: 5.0,
+                count: 4,
+            };
+            let (coverage_loop, router) = loop_and_router(6, 4, Vec::new());
+            let open = vec![true; coverage_loop.len()];
+            let climb = Climb::new(slots, (2, 5.0), 1, (3.0, 18.0));
+            let mut executive =
+                Executive::new(airframe(), 65.0, coverage_loop, router).with_layer(climb);
+            let legs = vec![Leg {
+                first: 3,
+                count: 6,
+                direction: Direction::Forward,
+            }];
+            executive.set_goal(Goal::Legs(legs), &|_| true);
+            Self {
+                executive,
+                wing: Wing::new(Pose::new(Point::new(-60.0, -40.0), 0.4)),
+                height_m: 65.0,
+                open,
+                seen_m: Vec::new(),
+                refused: 0,
+            }
+        }
+
+        /// Flies for so long beside another one that is straight above or below, if any.
+        fn fly(&mut self, for_s: u64, beside: Option<(u16, f64)>) {
+            for _ in 0..for_s * 5 {
+                let at = self.wing.percept().pose;
+                #[allow(clippy::cast_possible_truncation, reason = "small numbers")]
+                let other = beside.map(|(id, height_m)| Sighting {
+                    id,
+                    east_dm: (at.east_m * 10.0) as i32,
+                    north_dm: (at.north_m * 10.0) as i32,
+                    height_dm: (height_m * 10.0) as i32,
+                });
+                let percept = Percept {
+                    height_m: self.height_m,
+                    traffic: Traffic::new(5_000.0, other),
+                    ..self.wing.percept()
+                };
+                let open = self.open.clone();
+                let is_open = |c: u16| open[usize::from(c)];
+                let (setpoint, events) = self.executive.step(&percept, &is_open);
+                for event in events {
+                    match event {
+                        Event::Seen(cells) => {
+                            for cell in cells {
+                                self.open[usize::from(cell)] = false;
+                                self.seen_m.push(self.height_m);
+                            }
+                        }
+                        Event::Refused { .. } => self.refused += 1,
+                        _ => {}
+                    }
+                }
+                self.height_m += (setpoint.height_m - self.height_m).clamp(-0.6, 0.6);
+                self.wing.setpoint = Some(setpoint);
+                self.wing.fly(200);
+            }
+        }
+    }
+
+    #[test]
+    fn cells_are_seen_from_within_the_layer_alone_and_none_is_given_up_on_the_way() {
+        let mut flight = Flight::new();
+        let left_ms = {
+            flight.fly(1, None);
+            flight.executive.to_layer_ms()
+        };
+        assert!((11_000..14_000).contains(&left_ms), "{left_ms}");
+        let told_ms = flight.executive.finish_ms(&|_| true);
+        assert!(told_ms > left_ms + 6 * 48 * 1_000 / 13, "{told_ms}");
+        flight.fly(8, None);
+        assert!(flight.executive.changes_layer() && flight.seen_m.is_empty());
+        flight.fly(60, None);
+        assert!(!flight.executive.changes_layer() && flight.height_m == 105.0);
+        assert!(flight.seen_m.len() >= 6, "{:?}", flight.seen_m);
+        assert!(
+            flight.seen_m.iter().all(|m| *m >= 99.0),
+            "{:?}",
+            flight.seen_m
+        );
+        assert_eq!(flight.refused, 0);
+        assert!((3..9).all(|c| !flight.open[c]));
+    }
+
+    /// Who cruises above it is waited for in a circle where the cells begin; who stays there for
+    /// good is left behind along the loop.
+    #[test]
+    fn who_is_held_up_circles_and_then_flies_on() {
+        let mut flight = Flight::new();
+        let above = Some((3, 70.0));
+        flight.fly(12, above);
+        assert_eq!(flight.height_m, 67.5);
+        assert!(flight.seen_m.is_empty() && flight.refused == 0);
+        let held = flight.executive.layered.as_ref().unwrap();
+        assert!(!held.is_held_up && !held.shares);
+        flight.fly(super::PATIENCE_MS / 1000, above);
+        assert!(flight.executive.layered.as_ref().unwrap().is_held_up);
+        let before = flight.wing.pose.position();
+        flight.fly(12, above);
+        let flown_m = (flight.wing.pose.position() - before).norm();
+        assert!(flown_m > 60.0, "{flown_m}");
+        flight.fly(STUCK_MS / 1000 + 60, None);
+        assert!(!flight.executive.changes_layer());
+        assert!((3..9).all(|c| !flight.open[c]) && flight.refused == 0);
+    }
+
+    #[test]
+    fn what_has_no_cells_for_it_keeps_its_height_where_others_climb_and_never_descends() {
+        let mut flight = Flight::new();
+        flight.executive.set_goal(Goal::Hold, &|_| true);
+        flight.fly(30, None);
+        assert_eq!(flight.height_m, 105.0, "upwards it goes at once");
+        let mut above = Flight::new();
+        above.executive.set_goal(Goal::Hold, &|_| true);
+        above.height_m = 137.5;
+        above.fly(10, None);
+        assert!(
+            above.height_m >= 117.0 && above.height_m <= 137.5,
+            "{}",
+            above.height_m
+        );
+        let rests_m = above.height_m;
+        above.fly(30, None);
+        assert_eq!(above.height_m, rests_m);
+    }
+}

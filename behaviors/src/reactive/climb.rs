@@ -100,7 +100,9 @@ impl Slots {
 
     /// The longest way from one rest to the next, metres.
     fn stride_m(&self) -> f64 {
-        let gaps = self.gaps_m().map(|(low_m, high_m, parts)| (high_m - low_m) / f64::from(parts.max(1)));
+        let gaps = self
+            .gaps_m()
+            .map(|(low_m, high_m, parts)| (high_m - low_m) / f64::from(parts.max(1)));
         gaps.fold(self.step_m, f64::max)
     }
 
@@ -253,7 +255,13 @@ impl Climb {
         if !upwards && !may_descend {
             return rest_m;
         }
-        let within = |r: &&f64| if upwards { **r <= slot_m } else { **r >= slot_m };
+        let within = |r: &&f64| {
+            if upwards {
+                **r <= slot_m
+            } else {
+                **r >= slot_m
+            }
+        };
         let ahead = rests[resting + 1..].iter().take_while(within);
         for to_m in ahead.take(LOOKS_AHEAD) {
             match self.room(percept, rest_m, *to_m) {
@@ -348,5 +356,232 @@ impl Climb {
             slots.any(|s| (s - other.height_m()).abs() <= AT_M)
         };
         stays_ms < STUCK_MS && !(stays_ms >= CRUISES_MS && is_at_slot())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::percept_at;
+    use crate::traffic::{TRAFFIC_MAX, Traffic};
+    use proptest::prelude::*;
+    use skein_geometry::frame::{Point, Pose};
+    use skein_geometry::math::sin_cos;
+
+    const STEP_M: f64 = 5.0;
+
+    fn slots(count: u16) -> Slots {
+        Slots {
+            layers_m: vec![60.0, 100.0, 147.0],
+            step_m: STEP_M,
+            count,
+        }
+    }
+
+    fn climb(id: u16, layer: usize) -> Climb {
+        let offset_m = STEP_M * f64::from(id - 1);
+        Climb::new(slots(8), (id, offset_m), layer, (3.0, 20.0))
+    }
+
+    fn other(id: u16, east_m: f64, height_m: f64) -> Sighting {
+        #[allow(clippy::cast_possible_truncation, reason = "small numbers")]
+        let dm = |m: f64| (m * 10.0).round() as i32;
+        Sighting {
+            id,
+            east_dm: dm(east_m),
+            north_dm: 0,
+            height_dm: dm(height_m),
+        }
+    }
+
+    fn percept(time_ms: u64, height_m: f64, others: &[Sighting]) -> Percept {
+        Percept {
+            height_m,
+            traffic: Traffic::new(5_000.0, others.iter().copied()),
+            ..percept_at(Pose::new(Point::new(0.0, 0.0), 0.0), time_ms)
+        }
+    }
+
+    /// Where a UAV goes that has seen these others for a while.
+    fn goes(mut climb: Climb, height_m: f64, others: &[Sighting]) -> f64 {
+        let _ = climb.next_m(&percept(1_000, height_m, others), true);
+        climb.to_m = None;
+        climb.next_m(&percept(3_000, height_m, others), true)
+    }
+
+    #[test]
+    fn alone_it_climbs_from_rest_to_rest_and_stays_at_its_slot() {
+        let mut climb = climb(3, 1);
+        let (mut height_m, mut rests) = (70.0, vec![70.0]);
+        for n in 0..400 {
+            let next_m = climb.next_m(&percept(n * 200, height_m, &[]), false);
+            if rests.last() != Some(&next_m) {
+                rests.push(next_m);
+            }
+            height_m += f64::clamp(next_m - height_m, -0.6, 0.6);
+        }
+        assert_eq!(rests[..4], [70.0, 72.5, 77.5, 82.5], "{rests:?}");
+        assert_eq!(rests.last(), Some(&110.0), "{rests:?}");
+        assert!(climb.is_in_layer(110.0) && climb.is_in_layer(99.5) && !climb.is_in_layer(98.5));
+        assert!(climb.is_in_layer(135.9) && !climb.is_in_layer(136.5));
+        // What comes down waits until it is asked for there.
+        let mut down = self::climb(3, 0);
+        assert_eq!(down.next_m(&percept(0, 110.0, &[]), false), 110.0);
+        assert_eq!(down.next_m(&percept(200, 110.0, &[]), true), 107.5);
+        // Who begins between two rests goes on to the next.
+        assert_eq!(
+            self::climb(3, 1).next_m(&percept(0, 74.0, &[]), false),
+            77.5
+        );
+    }
+
+    #[test]
+    fn who_is_near_is_waited_for_and_who_is_far_is_passed() {
+        let at_rest = |others: &[Sighting]| goes(climb(3, 1), 72.5, others);
+        assert_eq!(
+            at_rest(&[other(4, 40.0, 75.0)]),
+            72.5,
+            "on its way, and near"
+        );
+        assert_eq!(
+            at_rest(&[other(4, 200.0, 75.0)]),
+            77.5,
+            "on its way, and far"
+        );
+        assert_eq!(at_rest(&[other(5, 40.0, 80.0)]), 77.5, "half a slot beyond");
+        assert_eq!(
+            at_rest(&[other(3, 40.0, 70.0)]),
+            72.5 + 5.0,
+            "half a slot behind"
+        );
+        assert_eq!(
+            at_rest(&[other(4, 900.0, 77.5)]),
+            72.5,
+            "at its end, and may go on"
+        );
+        // Nobody else is there for good.
+        let mut stuck = climb(3, 1);
+        let others = [other(4, 900.0, 77.5)];
+        let _ = stuck.next_m(&percept(0, 72.5, &others), false);
+        assert_eq!(stuck.next_m(&percept(STUCK_MS, 72.5, &others), false), 82.5);
+        // Without a sensor, or where it holds no more, nobody goes.
+        let mut blind = climb(3, 1);
+        let mut unseen = percept(0, 72.5, &[]);
+        unseen.traffic = Traffic::default();
+        assert_eq!(blind.next_m(&unseen, false), 72.5);
+        let crowd: Vec<Sighting> = (10..10 + TRAFFIC_MAX)
+            .map(|id| other(u16::try_from(id).unwrap(), 900.0, 70.0))
+            .collect();
+        assert_eq!(goes(climb(3, 1), 72.5, &crowd), 72.5);
+        assert_eq!(goes(climb(3, 1), 72.5, &crowd[1..]), 77.5);
+    }
+
+    #[test]
+    fn of_two_who_could_go_to_one_rest_one_waits() {
+        // Between two slots somebody may go on; who leaves its slot lets those behind it go first.
+        assert_eq!(goes(climb(3, 1), 70.0, &[other(7, 900.0, 67.5)]), 70.0);
+        assert_eq!(goes(climb(2, 1), 67.5, &[other(3, 900.0, 70.0)]), 72.5);
+        // Who comes against it: the higher number waits.
+        assert_eq!(goes(climb(3, 1), 72.5, &[other(2, 900.0, 82.5)]), 72.5);
+        assert_eq!(goes(climb(3, 1), 72.5, &[other(4, 900.0, 82.5)]), 77.5);
+        let both = climb(3, 1);
+        assert!(both.shares(&percept(0, 72.5, &[other(4, 200.0, 73.0)])));
+        assert!(!both.shares(&percept(0, 72.5, &[other(4, 400.0, 73.0)])));
+        assert!(!both.shares(&percept(0, 72.5, &[other(4, 200.0, 75.0)])));
+    }
+
+    #[test]
+    fn rests_are_half_a_slot_from_slots_and_a_slot_from_each_other() {
+        for count in 1..=8 {
+            let slots = slots(count);
+            let between = slots.between_m();
+            for rest in &between {
+                let nearest = slots.all_m().map(|s| (s - rest).abs());
+                assert!(
+                    nearest.fold(f64::INFINITY, f64::min) >= STEP_M / 2.0 - 1e-9,
+                    "{rest}"
+                );
+            }
+            let ways: Vec<f64> = between.windows(2).map(|w| w[1] - w[0]).collect();
+            let most_m = slots.stride_m();
+            assert!(
+                ways.iter()
+                    .all(|m| (STEP_M - AT_M..=most_m + 1e-9).contains(m)),
+                "{count}: {ways:?}"
+            );
+        }
+    }
+
+    /// A UAV that flies from place to place as fast as any, and changes layers meanwhile.
+    struct Flyer {
+        climb: Climb,
+        at: Point,
+        course_rad: f64,
+        height_m: f64,
+        climb_mps: f64,
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        /// However they fly, all get to their layer, and nobody comes near to another.
+        #[test]
+        fn all_arrive_and_keep_apart(
+            courses in proptest::collection::vec((0.0..1.0_f64, 0.0..1.0_f64, -0.6..0.6_f64), 8),
+            laps in proptest::collection::vec(0_usize..3, 8),
+            late in 0_usize..8,
+        ) {
+            let side_m = 700.0;
+            let mut flyers: Vec<Flyer> = (1..).zip(&courses).zip(&laps).map(|((id, c), from)| {
+                let from = (*from).min(1);
+                let slot_m = slots(8).layers_m[from] + STEP_M * f64::from(id - 1);
+                Flyer {
+                    climb: climb(id, from + 1),
+                    at: Point::new(c.0 * side_m, c.1 * side_m),
+                    course_rad: 6.0 * c.0,
+                    height_m: slot_m,
+                    climb_mps: 3.0,
+                }
+            }).collect();
+            for tick in 0..4_000_u64 {
+                let now_ms = tick * 100;
+                let all: Vec<Sighting> = (1..).zip(&flyers).map(|(id, f)| Sighting {
+                    north_dm: other(0, f.at.y, 0.0).east_dm,
+                    ..other(id, f.at.x, f.height_m)
+                }).collect();
+                for (i, f) in flyers.iter_mut().enumerate() {
+                    // One of them is later than the others, as after a partition.
+                    let waits = i == late && now_ms < 60_000;
+                    if (tick as usize + i) % 2 == 0 && !waits {
+                        let others = all.iter().copied().filter(|s| usize::from(s.id) != i + 1);
+                        let told = Percept {
+                            pose: Pose::new(f.at, f.course_rad),
+                            traffic: Traffic::new(5_000.0, others),
+                            ..percept(now_ms, f.height_m, &[])
+                        };
+                        let next_m = f.climb.next_m(&told, true);
+                        let way_m = 0.2 * f.climb_mps;
+                        f.height_m += f64::clamp(next_m - f.height_m, -way_m, way_m);
+                    }
+                    let (s, c) = sin_cos(f.course_rad);
+                    f.at = Point::new(f.at.x + 1.4 * c, f.at.y + 1.4 * s);
+                    f.course_rad += 0.1 * courses[i].2;
+                    let is_out = !(0.0..=side_m).contains(&f.at.x) || !(0.0..=side_m).contains(&f.at.y);
+                    if is_out {
+                        let to = Point::new(side_m / 2.0, side_m / 2.0) - f.at;
+                        f.course_rad = skein_geometry::math::atan2(to.y, to.x) + courses[i].2;
+                    }
+                }
+                for (i, a) in flyers.iter().enumerate() {
+                    for b in &flyers[i + 1..] {
+                        let (flat_m, high_m) = ((a.at - b.at).norm(), a.height_m - b.height_m);
+                        let apart_m = (flat_m * flat_m + high_m * high_m).sqrt();
+                        prop_assert!(apart_m >= STEP_M / 2.0 - AT_M, "{apart_m} m at {now_ms} ms");
+                    }
+                }
+            }
+            for f in &flyers {
+                prop_assert!((f.height_m - f.climb.slot_m()).abs() <= AT_M, "{} of {}", f.height_m, f.climb.slot_m());
+            }
+        }
     }
 }

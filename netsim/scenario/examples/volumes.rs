@@ -66,7 +66,9 @@ impl Teller for Row {
 }
 
 fn main() -> ExitCode {
-    println!("| trial, UAVs | passed | layers seen, p50 | time over the work bound, p50, p95 | nearest |");
+    println!(
+        "| trial, UAVs | passed | layers seen, p50 | time over the work bound, p50, p95 | nearest |"
+    );
     println!("|---|---|---|---|---|");
     match Campaign::of_arguments("volume", "1,3,8") {
         Ok(campaign) => campaign.fly(&mut Row::default()),

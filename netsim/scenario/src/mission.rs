@@ -4,8 +4,8 @@
 
 use crate::flight_model::turn_radius_m;
 use crate::mounts::{check_mounts, held_footprint_m};
-use crate::read::{Stated, layers};
 use crate::read::targets::Asked;
+use crate::read::{Stated, layers};
 use crate::request::AreaPlanner;
 use skein_flight::airframe::Airframe;
 use skein_flight::trajectory::wind::Wind;

@@ -40,10 +40,7 @@ pub struct Airframe {
     #[serde(default, skip_serializing_if = "Mount::is_level")]
     pub mount: Mount,
     /// How fast it climbs and descends at any airspeed, m/s.
-    #[serde(
-        default = "usual_climb_mps",
-        skip_serializing_if = "is_usual_climb"
-    )]
+    #[serde(default = "usual_climb_mps", skip_serializing_if = "is_usual_climb")]
     pub climb_mps: f64,
 }
 

@@ -87,7 +87,8 @@ impl Layers {
     pub fn bands_m(&self) -> Vec<(f64, f64)> {
         let slots = self.slots();
         let all = 0..self.heights_mm.len();
-        all.filter_map(|layer| slots.band_m(layer, BAND_M)).collect()
+        all.filter_map(|layer| slots.band_m(layer, BAND_M))
+            .collect()
     }
 
     /// What is wrong with it, if anything.
@@ -208,10 +209,15 @@ impl Mission {
             ));
         }
         if !self.task.is_area() {
-            return Err("an area in lanes is flown in layers; not exact passes, points or lines".into());
+            return Err(
+                "an area in lanes is flown in layers; not exact passes, points or lines".into(),
+            );
         }
         if self.separation_mm > 0 {
-            return Err("UAVs that keep apart at one height cannot fly in layers; leave separation_m out".into());
+            return Err(
+                "UAVs that keep apart at one height cannot fly in layers; leave separation_m out"
+                    .into(),
+            );
         }
         if self.goes_round() || self.traces() {
             return Err("what is flown in layers ends with the highest; expected a diagram that does not go on".into());
@@ -222,14 +228,16 @@ impl Mission {
             ("streets", self.streets.is_some()),
         ];
         if let Some((what, _)) = looks.iter().find(|(_, asked)| *asked) {
-            return Err(format!("{what} are told from one height; leave them out, or the layers"));
+            return Err(format!(
+                "{what} are told from one height; leave them out, or the layers"
+            ));
         }
         Ok(())
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use std::sync::Arc;
 
@@ -257,7 +265,11 @@ mod tests {
         m.check_layers().unwrap();
         let heights: Vec<u32> = (0..6)
             .map(|n| {
-                let lap = if n == 0 { m.clone() } else { m.later_lap(1 + n).unwrap() };
+                let lap = if n == 0 {
+                    m.clone()
+                } else {
+                    m.later_lap(1 + n).unwrap()
+                };
                 assert_eq!(lap.dimension(), 3);
                 lap.check_layers().unwrap();
                 lap.layer().unwrap().height_mm / 1000
@@ -274,9 +286,15 @@ mod tests {
     fn layers_that_cannot_be_flown_are_refused_with_what_was_expected() {
         let cases: [(fn(&mut Layers), &str); 8] = [
             (|l| l.heights_mm.clear(), "found 0"),
-            (|l| l.heights_mm = (1..=17).map(|n| n * 50_000).collect(), "found 17"),
+            (
+                |l| l.heights_mm = (1..=17).map(|n| n * 50_000).collect(),
+                "found 17",
+            ),
             (|l| l.heights_mm[1] = 60_000, "expected rising heights"),
-            (|l| l.heights_mm[1] = 50_000, "the layer at 50 m follows that at 60 m"),
+            (
+                |l| l.heights_mm[1] = 50_000,
+                "the layer at 50 m follows that at 60 m",
+            ),
             (|l| l.heights_mm[1] = 99_999, "expected layers 40 m apart"),
             (|l| l.slots = 9, "each of 9 UAVs"),
             (|l| l.slot_mm = 3_999, "expected 4 m or more"),
@@ -293,7 +311,10 @@ mod tests {
             (|m| m.further_laps = 3, "4 laps do not see each of 3 layers"),
             (|m| m.task = crate::CoverageTask::Exact, "not exact passes"),
             (|m| m.separation_mm = 30_000, "leave separation_m out"),
-            (|m| m.detections.push(crate::criteria::Criterion::default()), "detections"),
+            (
+                |m| m.detections.push(crate::criteria::Criterion::default()),
+                "detections",
+            ),
         ];
         for (change, wanted) in missions {
             let mut m = mission();
@@ -303,6 +324,26 @@ mod tests {
             assert!(Arc::new(m).geometry().is_err());
         }
         assert_eq!(mission().check_layers(), Ok(()));
+    }
+
+    /// On the wire it is said where there are layers, and by whole numbers.
+    #[test]
+    fn what_has_no_layers_says_nothing_of_them_and_what_has_is_heard_as_it_was_said() {
+        let bytes = |m: &Mission| -> Vec<u8> {
+            let pieces = crate::mission::chunks(m).unwrap();
+            pieces.into_iter().flat_map(|p| p.bytes).collect()
+        };
+        let tells = |m: &Mission| bytes(m).windows(6).any(|w| w == b"layers");
+        let (flat, volume) = (crate::testing::mission(1, 6, 4), mission());
+        assert!(!tells(&flat) && tells(&volume));
+        let heard: Mission = cbor4ii::serde::from_slice(&bytes(&volume)).unwrap();
+        assert_eq!(heard, volume);
+        // Three layers cost a mission some eighty bytes.
+        let flat = Mission {
+            layers: None,
+            ..volume.clone()
+        };
+        assert!((60..100).contains(&(bytes(&volume).len() - bytes(&flat).len())));
     }
 
     /// What was seen at one height says nothing of another, though the cells are the same.
@@ -323,7 +364,11 @@ mod tests {
         };
         assert_ne!(hash(without), hash(mission()));
         let second = mission().next_lap().unwrap();
-        let known = Arc::new(mission()).geometry().unwrap().coverage_loop.hash_in_lap(0, 1);
+        let known = Arc::new(mission())
+            .geometry()
+            .unwrap()
+            .coverage_loop
+            .hash_in_lap(0, 1);
         assert_eq!(hash(second), known, "whoever hears of a later lap can tell");
     }
 }

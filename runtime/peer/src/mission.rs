@@ -921,7 +921,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 42] = [
+        let changes: [fn(&mut Mission); 45] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -972,6 +972,17 @@ mod tests {
                 let mut streets = crate::streets::tests::block();
                 streets.ways[0].places[1].0 += 1;
                 m.streets = Some(Arc::new(streets));
+            },
+            |m| m.layers = Some(Arc::new(crate::layers::tests::three())),
+            |m| {
+                let mut layers = crate::layers::tests::three();
+                layers.heights_mm[2] += 1;
+                m.layers = Some(Arc::new(layers));
+            },
+            |m| {
+                let mut layers = crate::layers::tests::three();
+                layers.slots += 1;
+                m.layers = Some(Arc::new(layers));
             },
             |m| m.counts.push(crossing(0)),
             |m| m.counts.push(crossing(1)),

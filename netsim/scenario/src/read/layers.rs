@@ -125,3 +125,134 @@ pub(crate) fn storm(s: &Stated) -> StormSpec {
     }
     storm
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{Overrides, Scenario};
+
+    const TRIAL: &str = include_str!("../../../../configs/trials/volume.json5");
+
+    fn with(changes: &[(&str, &str)]) -> Result<Scenario, String> {
+        let text = changes.iter().fold(TRIAL.to_owned(), |text, (from, to)| {
+            assert!(text.contains(from), "{from}");
+            text.replacen(from, to, 1)
+        });
+        let files = crate::builtin::files();
+        let read = crate::parse_with("v.json5", &text, &files, &Overrides::default());
+        read.map_err(|e| e.to_string())
+    }
+
+    const LAYERS: &str = "layers_m: [60, 160, 260]";
+
+    #[test]
+    fn what_cannot_be_flown_in_layers_is_refused_with_its_place() {
+        let cases: [(&[(&str, &str)], &str, &str); 14] = [
+            (
+                &[(LAYERS, "layers_m: []")],
+                "mission.layers_m",
+                "has 0 layers",
+            ),
+            (&[(LAYERS, "layers_m: 60")], "mission.layers_m", "list"),
+            (
+                &[(LAYERS, "layers_m: [70, 160]")],
+                "mission.layers_m[0]",
+                "expected 60, or level_m: 70",
+            ),
+            (
+                &[(LAYERS, "layers_m: [60, 60]")],
+                "mission.layers_m[1]",
+                "expected rising heights",
+            ),
+            (
+                &[(LAYERS, "layers_m: [60, 50]")],
+                "mission.layers_m[1]",
+                "not above the layer before",
+            ),
+            (
+                &[(LAYERS, "layers_m: [60, 5001]")],
+                "mission.layers_m[1]",
+                "5000",
+            ),
+            (
+                &[(LAYERS, "layers_m: [60, 70]")],
+                "mission.layers_m",
+                "expected layers 15 m apart",
+            ),
+            (
+                &[("slot_step_m: 5", "slot_step_m: 3.9")],
+                "mission.layers_m",
+                "expected 4 m or more",
+            ),
+            (
+                &[("min_separation_m: 2", "min_separation_m: 3")],
+                "checks.min_separation_m",
+                "2.5 m",
+            ),
+            (
+                &[(
+                    "launch: \"base\", slot_step_m: 5",
+                    "launch: \"spread\", separation_m: 30",
+                )],
+                "fleet.separation_m",
+                "a slot in each layer",
+            ),
+            (
+                &[("seed: 1,", "seed: 1, planner: \"exact\",")],
+                "mission.layers_m",
+                "planner: \"lanes\"",
+            ),
+            (
+                &[("diagram: \"volume\"", "diagram: \"patrol\"")],
+                "mission.diagram",
+                "goes on once everything is seen",
+            ),
+            (
+                &[(
+                    "diagram: \"volume\"",
+                    "counts: [{ name: \"a\", what: \"passing\", circle: { east_m: 100, north_m: 100, radius_m: 10 } }]",
+                )],
+                "mission.layers_m",
+                "counts are told from one height",
+            ),
+            (
+                &[("seed: 1,", "seed: 1, laps: 2,")],
+                "mission.diagram",
+                "the mission has laps",
+            ),
+        ];
+        for (changes, place, says) in cases {
+            let why = with(changes).map(drop).unwrap_err();
+            assert!(
+                why.contains(place) && why.contains(says),
+                "{changes:?}: {why}"
+            );
+        }
+    }
+
+    #[test]
+    fn each_lap_goes_through_all_layers_and_each_uav_has_a_slot_in_each() {
+        let plain = with(&[(", diagram: \"volume\"", "")]).unwrap().spec;
+        let layers = plain.mission.layers.clone().unwrap();
+        assert_eq!(layers.heights_mm, [60_000, 160_000, 260_000]);
+        assert_eq!(
+            (layers.slot_mm, layers.slots, layers.fastest_mmps),
+            (5_000, 3, 20_000)
+        );
+        assert!(plain.mission.diagram.is_none() && plain.mission.further_laps == 2);
+        assert!((plain.uavs[0].airframe.climb_mps - 3.5).abs() < 1e-9);
+        // A storm brings no UAVs for whom there is no slot.
+        let troubles = plain.storm.troubles;
+        assert_eq!((troubles.max_uavs, troubles.max_crowd), (0, 0));
+        let twice = with(&[
+            (", diagram: \"volume\"", ""),
+            ("seed: 1,", "seed: 1, laps: 2,"),
+        ]);
+        assert_eq!(twice.unwrap().spec.mission.further_laps, 5);
+        let alone = with(&[(LAYERS, "layers_m: [60]")])
+            .unwrap()
+            .spec
+            .mission
+            .further_laps;
+        assert_eq!(alone, 0);
+    }
+}

@@ -146,7 +146,10 @@ impl LayerReport {
     pub fn line(&self) -> String {
         let (lap, height_m) = (self.lap, self.height_m);
         match self.seen_ms {
-            Some(ms) => format!("{height_m} m (lap {lap}): all seen at {:.1} s", super::secs(ms)),
+            Some(ms) => format!(
+                "{height_m} m (lap {lap}): all seen at {:.1} s",
+                super::secs(ms)
+            ),
             None => format!("{height_m} m (lap {lap}): {} cells not seen", self.lacking),
         }
     }

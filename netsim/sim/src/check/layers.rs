@@ -13,7 +13,7 @@ pub struct LayerCheck {
 
 impl LayerCheck {
     /// A UAV says that this mission is finished; `seen` is what cameras saw of its laps, by the
-    /// true heights of those who looked.
+    /// true heights of those who looked: nothing where all is flown at one height.
     pub fn on_finished(
         &mut self,
         (now_ms, id): (u64, u16),
@@ -23,7 +23,7 @@ impl LayerCheck {
     ) {
         // What ends by time or by an order need not have been seen.
         let ends = mission.cancelled || mission.ends_after_s().is_some();
-        if self.told || ends || mission.layers.is_none() {
+        if self.told || ends {
             return;
         }
         let Some(layer) = seen.iter().find(|l| l.seen_ms.is_none()) else {
@@ -95,7 +95,10 @@ mod tests {
         let broken = check(&mission(), None);
         assert_eq!(broken.len(), 1, "{broken:?}");
         let text = &broken[0].text;
-        assert!(text.contains("3 cells of lap 2") && text.contains("100 m"), "{text}");
+        assert!(
+            text.contains("3 cells of lap 2") && text.contains("100 m"),
+            "{text}"
+        );
         let ended = Mission {
             cancelled: true,
             ..mission()
@@ -114,6 +117,10 @@ mod tests {
         let flat = (*fixture::square(2).mission).clone();
         assert!(!is_judged(&flat, &near, |id| id));
         assert!(is_judged(&mission(), &near, |id| id));
-        assert!(!is_judged(&mission(), &near, |id| if id == 9 { 1 } else { id }));
+        assert!(!is_judged(&mission(), &near, |id| if id == 9 {
+            1
+        } else {
+            id
+        }));
     }
 }

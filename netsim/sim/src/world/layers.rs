@@ -38,7 +38,9 @@ impl LayerBook {
         let lowest = layers.slots().layers_m;
         let bands = lowest.into_iter().zip(layers.bands_m());
         Self {
-            bands_m: bands.map(|(at_m, (low_m, high_m))| (at_m, low_m, high_m)).collect(),
+            bands_m: bands
+                .map(|(at_m, (low_m, high_m))| (at_m, low_m, high_m))
+                .collect(),
             ..Self::default()
         }
     }
@@ -102,5 +104,86 @@ impl LayerBook {
             })
         };
         (1..=laps).filter_map(one).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::camera::{Camera, Eye};
+    use crate::world::fixture::{airframe, square};
+    use crate::world::motion::Piece;
+    use crate::world::{Fact, Judge, Survey};
+    use skein_flight::coverage::ring::CellId;
+    use skein_flight::trajectory::wind::Wind;
+    use skein_geometry::frame::{Point, Pose};
+    use std::sync::Arc;
+
+    /// The fixture's area at 45 m and at 100 m, with slots of two UAVs.
+    fn judge() -> Judge {
+        let mut spec = square(1);
+        spec.zones.clear();
+        let mut mission = (*spec.mission).clone();
+        mission.zones.clear();
+        mission.area = vec![(0, 0), (480_000, 0), (480_000, 48_000), (0, 48_000)];
+        mission.layers = Some(Arc::new(Layers {
+            heights_mm: vec![45_000, 100_000],
+            slot_mm: 5_000,
+            slots: 2,
+            fastest_mmps: 16_000,
+        }));
+        mission.further_laps = 1;
+        spec.mission = Arc::new(mission);
+        Judge::new(Arc::new(Survey::new(&spec))).with_laps(2)
+    }
+
+    /// Flies along the only lane at a height.
+    fn along(judge: &mut Judge, height_m: f64, at_ms: u64) -> usize {
+        let (airframe, camera) = (airframe(), Camera::new(&airframe()));
+        let piece = Piece {
+            from_ms: at_ms,
+            to_ms: at_ms + 42_000,
+            start: Pose::new(Point::new(-30.0, 24.0), 0.0),
+            speed_mps: 13.0,
+            turn_rate_radps: 0.0,
+            wind: Wind::CALM,
+        };
+        let mut facts = Vec::new();
+        judge.watch(
+            1,
+            Eye::new(&airframe, &camera, height_m),
+            &piece,
+            &mut facts,
+        );
+        facts
+            .iter()
+            .filter(|f| matches!(f, Fact::Seen { .. }))
+            .count()
+    }
+
+    #[test]
+    fn pictures_count_from_within_the_layer_of_the_lap_alone() {
+        let mut judge = judge();
+        let first = CellId { col: 0, row: 0 };
+        for outside_m in [42.9, 52.1, 100.0] {
+            assert_eq!(along(&mut judge, outside_m, 1_000), 0, "{outside_m}");
+        }
+        assert!(!judge.saw(1, first, 1));
+        assert_eq!(judge.layers()[0].lacking, 10);
+        // In the middle of this flight the first lap ends: what is seen after it counts for none.
+        assert_eq!(along(&mut judge, 48.0, 100_000), 10);
+        assert!(judge.saw(1, first, 1) && !judge.saw(1, first, 2) && !judge.complete());
+        assert_eq!(along(&mut judge, 45.0, 200_000), 0);
+        assert_eq!(along(&mut judge, 104.0, 300_000), 10);
+        assert!(judge.saw(1, first, 2) && judge.complete());
+        let seen = judge.layers();
+        assert_eq!((seen.len(), seen[0].lap, seen[1].lap), (2, 1, 2));
+        assert!(seen[0].seen_ms.is_some_and(|t| t > 130_000 && t < 145_000));
+        assert!(seen[1].seen_ms.is_some_and(|t| t > 330_000 && t < 345_000));
+        assert_eq!(
+            judge.longest_gap_ms(),
+            None,
+            "nothing is seen again from there"
+        );
     }
 }

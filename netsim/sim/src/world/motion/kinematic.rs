@@ -524,6 +524,37 @@ mod tests {
     use skein_behaviors::Steer;
     use skein_geometry::math::cos;
 
+    #[test]
+    fn it_climbs_at_its_rate_to_what_was_commanded_last_also_without_its_computer() {
+        let mut k = fresh();
+        let mut flown = Vec::new();
+        let up = Setpoint {
+            from_ms: 0,
+            airspeed_mps: 13.0,
+            height_m: 51.0,
+            steps: Vec::new(),
+            loiter: Side::Left,
+            gimbal: Vec::new(),
+        };
+        let none = Setpoint {
+            height_m: f64::NAN,
+            ..up.clone()
+        };
+        assert!(!k.apply(none, 0));
+        assert!(k.apply(up, 0));
+        k.advance(1_000, &mut flown);
+        assert!((k.height_m() - 48.0).abs() < 1e-9, "{}", k.height_m());
+        assert!((k.percept().unwrap().height_m - 48.0).abs() < 1e-9);
+        k.advance(9_000, &mut flown);
+        assert!(k.failsafe() && (k.height_m() - 51.0).abs() < 1e-9);
+        k.kill();
+        k.relaunch(10_000);
+        assert!(
+            (k.height_m() - 45.0).abs() < 1e-9,
+            "a new one is where it was launched"
+        );
+    }
+
     fn fresh() -> Kinematic {
         Kinematic::new(
             airframe(),
