@@ -351,7 +351,7 @@ pub(crate) mod tests {
     fn other_heights_are_another_loop() {
         let hash = |m: Mission| Arc::new(m).geometry().unwrap().coverage_loop.hash();
         let mut higher = three();
-        higher.heights_mm[0] += 1_000;
+        higher.heights_mm[2] += 1_000;
         let higher = Mission {
             layers: Some(Arc::new(higher)),
             ..mission()
