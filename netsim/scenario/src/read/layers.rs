@@ -179,7 +179,10 @@ mod tests {
                 "expected layers 15 m apart",
             ),
             (
-                &[("slot_step_m: 5", "slot_step_m: 3.9")],
+                &[
+                    ("slot_step_m: 5", "slot_step_m: 3.9"),
+                    ("min_separation_m: 2", "min_separation_m: 1"),
+                ],
                 "mission.layers_m",
                 "expected 4 m or more",
             ),

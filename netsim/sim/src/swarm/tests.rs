@@ -871,7 +871,7 @@ fn a_volume_is_seen_layer_by_layer_and_climbs_are_judged() {
 fn who_marks_cells_at_the_wrong_height_breaks_the_rule() {
     let layered = Prepared::new(in_layers(2));
     let mut flat = in_layers(2);
-    let mission = Mission {
+    let mission = skein_peer::Mission {
         layers: None,
         ..(*flat.mission).clone()
     };

@@ -242,7 +242,7 @@ impl Board {
 
     pub(super) fn look(&mut self, uav: u16, eye: &Eye<'_>, piece: &Piece, facts: &mut Vec<Fact>) {
         self.layers.looks_from(eye.height_m);
-        if !self.layers.counts(self.lap) {
+        if !self.layers.counts_until(self.lap) {
             return;
         }
         let length_m = piece.length_m();
@@ -346,8 +346,15 @@ impl Board {
         if let Some(watch) = &mut self.watch {
             watch.see(i, sighting.at_ms);
         }
-        // In the middle of a picture the last cell of a lap may have been seen.
-        if self.seen[i].is_some() || !self.layers.counts(self.lap) {
+        // Each cell counts from within the layer of its own next lap: the last one of a lap may
+        // have been seen in the middle of a picture, and one that need not be seen may be behind.
+        let lap = self.times[i].0.saturating_add(1);
+        if self.seen[i].is_some() || !self.layers.counts(lap) {
+            return;
+        }
+        if !self.layers.is_flat() && lap < self.lap {
+            self.times[i] = (lap, sighting.at_ms);
+            self.marks += 1;
             return;
         }
         self.seen[i] = Some(sighting);

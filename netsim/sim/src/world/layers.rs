@@ -77,6 +77,12 @@ impl LayerBook {
         band.is_none_or(|(_, low_m, high_m)| (low_m..=high_m).contains(&self.from_m))
     }
 
+    /// Whether it counts for that lap or for one before it.
+    pub(super) fn counts_until(&self, lap: u16) -> bool {
+        let layers = u16::try_from(self.bands_m.len()).unwrap_or(u16::MAX);
+        (1..=lap.min(layers.max(1))).any(|earlier| self.counts(earlier)) || self.counts(lap)
+    }
+
     /// All of a lap was seen.
     pub(super) fn done(&mut self, lap: u16, at_ms: u64) {
         if !self.bands_m.is_empty() {
@@ -111,7 +117,7 @@ impl LayerBook {
 mod tests {
     use super::*;
     use crate::world::camera::{Camera, Eye};
-    use crate::world::fixture::{airframe, square};
+    use crate::world::fixture::{airframe, polygon, square};
     use crate::world::motion::Piece;
     use crate::world::{Fact, Judge, Survey};
     use skein_flight::coverage::ring::CellId;
@@ -121,10 +127,15 @@ mod tests {
 
     /// The fixture's area at 45 m and at 100 m, with slots of two UAVs.
     fn judge() -> Judge {
+        judge_with(&[])
+    }
+
+    /// The same with these zones.
+    fn judge_with(zones: &[&[(i32, i32)]]) -> Judge {
         let mut spec = square(1);
-        spec.zones.clear();
+        spec.zones = zones.iter().map(|z| polygon(z)).collect();
         let mut mission = (*spec.mission).clone();
-        mission.zones.clear();
+        mission.zones = zones.iter().map(|z| z.to_vec()).collect();
         mission.area = vec![(0, 0), (480_000, 0), (480_000, 48_000), (0, 48_000)];
         mission.layers = Some(Arc::new(Layers {
             heights_mm: vec![45_000, 100_000],
@@ -139,10 +150,14 @@ mod tests {
 
     /// Flies along the only lane at a height.
     fn along(judge: &mut Judge, height_m: f64, at_ms: u64) -> usize {
+        along_for(judge, height_m, at_ms, 42_000)
+    }
+
+    fn along_for(judge: &mut Judge, height_m: f64, at_ms: u64, for_ms: u64) -> usize {
         let (airframe, camera) = (airframe(), Camera::new(&airframe()));
         let piece = Piece {
             from_ms: at_ms,
-            to_ms: at_ms + 42_000,
+            to_ms: at_ms + for_ms,
             start: Pose::new(Point::new(-30.0, 24.0), 0.0),
             speed_mps: 13.0,
             turn_rate_radps: 0.0,
@@ -159,6 +174,32 @@ mod tests {
             .iter()
             .filter(|f| matches!(f, Fact::Seen { .. }))
             .count()
+    }
+
+    /// What need not be seen may be seen after all else of its layer was: it counts for that.
+    #[test]
+    fn a_cell_that_is_behind_counts_from_its_own_layer() {
+        let zone = [
+            (450_000, 10_000),
+            (470_000, 10_000),
+            (470_000, 38_000),
+            (450_000, 38_000),
+        ];
+        let (mut judge, last) = (judge_with(&[&zone]), CellId { col: 9, row: 0 });
+        let cells = judge.survey().cells();
+        assert!(
+            cells
+                .iter()
+                .any(|c| c.id == last && c.uncoverable.is_some())
+        );
+        along_for(&mut judge, 45.0, 1_000, 36_000);
+        assert!(judge.layers()[0].seen_ms.is_some() && !judge.saw(1, last, 1));
+        along(&mut judge, 100.0, 100_000);
+        assert!(!judge.saw(1, last, 1), "from another layer");
+        along(&mut judge, 45.0, 200_000);
+        assert!(judge.saw(1, last, 1) && !judge.saw(1, last, 2));
+        along(&mut judge, 100.0, 300_000);
+        assert!(judge.saw(1, last, 2));
     }
 
     #[test]
