@@ -10,7 +10,7 @@
 //! |---|---|
 //! | between them in height, or less than half a slot beyond, and so near that it could come there meanwhile | stays |
 //! | at the height of that rest, however far away | the one after it, two beyond at most |
-//! | between them and no cruiser, for less than [`STUCK_MS`] | stays: it may go there, too |
+//! | between them and no cruiser, for less than 20 s | stays: it may go there, too |
 //! | likewise, up to three ways beyond that rest and of a lower number; or behind who leaves its own slot | stays |
 //! | whoever may be there unseen: there is no sensor, or it holds no more | stays |
 //! | any other | goes |

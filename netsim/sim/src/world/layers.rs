@@ -180,10 +180,10 @@ mod tests {
     #[test]
     fn a_cell_that_is_behind_counts_from_its_own_layer() {
         let zone = [
-            (450_000, 10_000),
-            (470_000, 10_000),
-            (470_000, 38_000),
-            (450_000, 38_000),
+            (440_000, -200_000),
+            (700_000, -200_000),
+            (700_000, 250_000),
+            (440_000, 250_000),
         ];
         let (mut judge, last) = (judge_with(&[&zone]), CellId { col: 9, row: 0 });
         let cells = judge.survey().cells();
