@@ -241,6 +241,9 @@ pub(crate) mod tests {
     use super::*;
     use std::sync::Arc;
 
+    /// What is changed, and a part of what is said of it.
+    type Case<T> = (fn(&mut T), &'static str);
+
     pub(crate) fn three() -> Layers {
         Layers {
             heights_mm: vec![60_000, 100_000, 140_000],
@@ -284,7 +287,7 @@ pub(crate) mod tests {
 
     #[test]
     fn layers_that_cannot_be_flown_are_refused_with_what_was_expected() {
-        let cases: [(fn(&mut Layers), &str); 8] = [
+        let cases: [Case<Layers>; 8] = [
             (|l| l.heights_mm.clear(), "found 0"),
             (
                 |l| l.heights_mm = (1..=17).map(|n| n * 50_000).collect(),
@@ -307,7 +310,7 @@ pub(crate) mod tests {
             assert!(why.contains(wanted), "{why}");
         }
         assert_eq!(three().check(), Ok(()));
-        let missions: [(fn(&mut Mission), &str); 4] = [
+        let missions: [Case<Mission>; 4] = [
             (|m| m.further_laps = 3, "4 laps do not see each of 3 layers"),
             (|m| m.task = crate::CoverageTask::Exact, "not exact passes"),
             (|m| m.separation_mm = 30_000, "leave separation_m out"),

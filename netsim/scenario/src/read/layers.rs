@@ -142,11 +142,18 @@ mod tests {
         read.map_err(|e| e.to_string())
     }
 
+    /// What is changed, and the place and a part of what is said of it.
+    type Case = (
+        &'static [(&'static str, &'static str)],
+        &'static str,
+        &'static str,
+    );
+
     const LAYERS: &str = "layers_m: [60, 160, 260]";
 
     #[test]
     fn what_cannot_be_flown_in_layers_is_refused_with_its_place() {
-        let cases: [(&[(&str, &str)], &str, &str); 14] = [
+        let cases: [Case; 14] = [
             (
                 &[(LAYERS, "layers_m: []")],
                 "mission.layers_m",
@@ -206,8 +213,8 @@ mod tests {
             ),
             (
                 &[("diagram: \"volume\"", "diagram: \"patrol\"")],
-                "mission.diagram",
-                "goes on once everything is seen",
+                "mission.layers_m",
+                "a diagram that does not go on",
             ),
             (
                 &[(
