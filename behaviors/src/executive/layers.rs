@@ -138,6 +138,7 @@ impl Executive {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "heights are told exactly")]
 mod tests {
     use crate::event::Event;
     use crate::executive::{Executive, Goal};

@@ -360,6 +360,7 @@ impl Climb {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "heights are told exactly")]
 mod tests {
     use super::*;
     use crate::testing::percept_at;
@@ -551,7 +552,7 @@ mod tests {
                 for (i, f) in flyers.iter_mut().enumerate() {
                     // One of them is later than the others, as after a partition.
                     let waits = i == late && now_ms < 60_000;
-                    if (tick as usize + i) % 2 == 0 && !waits {
+                    if (tick as usize + i).is_multiple_of(2) && !waits {
                         let others = all.iter().copied().filter(|s| usize::from(s.id) != i + 1);
                         let told = Percept {
                             pose: Pose::new(f.at, f.course_rad),

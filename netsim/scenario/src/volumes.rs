@@ -1,5 +1,7 @@
 //! The built-in trial that is flown in height layers, with one UAV and with many, to its verdict.
 
+#![allow(clippy::float_cmp, reason = "heights are told as they were stated")]
+
 use crate::{Overrides, load_builtin};
 use skein_netsim::Prepared;
 use skein_netsim::runs::{Wanted, run};
