@@ -11,7 +11,7 @@ use skein_behaviors::reactive::follow::fly;
 use skein_behaviors::sightings::Sightings;
 use skein_behaviors::traffic::Traffic;
 use skein_behaviors::{Percept, Setpoint};
-use skein_flight::airframe::Airframe;
+use skein_flight::airframe::{Airframe, CLIMB_MPS};
 use skein_flight::coverage::ring::Tree;
 use skein_flight::coverage::ring::division::Rule;
 use skein_flight::mount::Mount;
@@ -46,6 +46,7 @@ fn airframe() -> Airframe {
         footprint_across_m: 46.0,
         footprint_along_m: 36.0,
         mount: Mount::Level,
+        climb_mps: CLIMB_MPS,
     }
 }
 
@@ -78,6 +79,7 @@ fn mission() -> Mission {
         tasks: Vec::new(),
         counts: Vec::new(),
         streets: None,
+        layers: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

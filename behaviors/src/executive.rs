@@ -7,7 +7,7 @@
 //! [`camera`], the way to a given circle from [`circle`], rounds of the loop from [`circuit`], the way along a contour that is seen from [`tracing`], turns after a moving target from [`pursuit`], a flight between cells and what it
 //! is for from [`detour`], where a gimbal turns from `gaze`, expectations for the peer from [`prediction`], what the fuel allows
 //! from [`endurance`], what stays of a flight when the
-//! goal changes from `goal_change`, how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
+//! goal changes from `goal_change`, to which height it flies from [`layers`], how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
 //! following the track and the safety of every setpoint are the reactive layer's.
 //!
 //! | goal | track | events |
@@ -40,6 +40,7 @@ pub mod endurance;
 mod gaze;
 pub mod given;
 mod goal_change;
+pub mod layers;
 pub mod new_zones;
 pub mod passes;
 pub mod prediction;
@@ -253,6 +254,8 @@ pub struct Executive {
     tracing: tracing::Tracing,
     /// How often cells were missed.
     passes: passes::Passes,
+    /// At which heights it flies, where those change.
+    layered: Option<layers::Layered>,
 }
 
 impl Executive {
@@ -291,6 +294,7 @@ impl Executive {
             circuit: circuit::Circuit::default(),
             tracing: tracing::Tracing::default(),
             passes: passes::Passes::default(),
+            layered: None,
         }
     }
 
@@ -470,11 +474,14 @@ impl Executive {
         events: &mut Vec<Event>,
     ) {
         let mut seen = Vec::new();
+        let Some(before) = self.played_in_layer(percept) else {
+            return;
+        };
         let transit = &self.transit;
         look(
             &*transit.coverage_loop,
             &transit.airframe,
-            self.played.as_ref(),
+            before,
             percept,
             is_open,
             &mut seen,
@@ -628,6 +635,9 @@ impl Executive {
         events: &mut Vec<Event>,
     ) -> Vec<Move> {
         if let Some(moves) = self.given_moves(at) {
+            return moves;
+        }
+        if let Some(moves) = self.wait_for_layer(at, is_open) {
             return moves;
         }
         if matches!(self.aim, Aim::Legs | Aim::Detour) {

@@ -3,7 +3,7 @@
 use crate::percept::Percept;
 use crate::reactive::follow::fly;
 use crate::setpoint::{Setpoint, Side};
-use skein_flight::airframe::Airframe;
+use skein_flight::airframe::{Airframe, CLIMB_MPS};
 use skein_flight::coverage::lanes;
 use skein_flight::coverage::ring::{CoverageLoop, LoopProblem};
 use skein_flight::mount::Mount;
@@ -30,6 +30,7 @@ pub fn airframe() -> Airframe {
         footprint_across_m: 46.0,
         footprint_along_m: 36.0,
         mount: Mount::Level,
+        climb_mps: CLIMB_MPS,
     }
 }
 

@@ -17,6 +17,9 @@ pub struct Sighting {
     pub east_dm: i32,
     /// Where, decimetres north of it.
     pub north_dm: i32,
+    /// How high above it, decimetres.
+    #[serde(default)]
+    pub height_dm: i32,
 }
 
 impl Sighting {
@@ -27,6 +30,12 @@ impl Sighting {
             f64::from(self.east_dm) / 10.0,
             f64::from(self.north_dm) / 10.0,
         )
+    }
+
+    /// How high above the origin, in metres.
+    #[must_use]
+    pub fn height_m(&self) -> f64 {
+        f64::from(self.height_dm) / 10.0
     }
 }
 

@@ -6,13 +6,16 @@
 
 use crate::json::{Error, Fields, Node};
 use crate::mount;
-use skein_flight::airframe::Airframe;
+use skein_flight::airframe::{Airframe, CLIMB_MPS};
 use skein_flight::mount::Mount;
 use skein_flight::trajectory::timed::Objective;
 use skein_geometry::math::tan;
 
 /// Airspeeds that are accepted, m/s: from a kite to the fastest small jet.
 pub const SPEED_MPS: (f64, f64) = (1.0, 150.0);
+
+/// Rates of climb that are accepted, m/s.
+pub const CLIMBS_MPS: (f64, f64) = (0.2, 50.0);
 
 /// Largest bank angles that are accepted, degrees.
 pub const BANK_DEG: (f64, f64) = (1.0, 80.0);
@@ -33,6 +36,7 @@ const FIELDS: &[&str] = &[
     "cruise_mps",
     "max_mps",
     "bank_deg",
+    "climb_mps",
     "endurance_s",
     "reserve_s",
     "camera",
@@ -94,6 +98,7 @@ pub fn read(node: &Node<'_>, level_m: Option<f64>) -> Result<Airframe, Error> {
         footprint_across_m: across_m,
         footprint_along_m: along_m,
         mount: mount.map_or(Ok(Mount::Level), mount::read)?,
+        climb_mps: f.number_or("climb_mps", CLIMB_MPS, CLIMBS_MPS.0, CLIMBS_MPS.1, "m/s")?,
     })
 }
 
@@ -170,6 +175,9 @@ pub fn to_json(a: &Airframe) -> serde_json::Value {
             "along_m": 2.0 * a.footprint_along_m,
         },
     });
+    if a.climb_mps.to_bits() != CLIMB_MPS.to_bits() {
+        json["climb_mps"] = a.climb_mps.into();
+    }
     if !a.mount.is_level() {
         json["camera"] = serde_json::json!({ "mount": mount::to_json(&a.mount) });
     }

@@ -14,6 +14,7 @@ impl Executive {
         percept: &Percept,
         is_open: &dyn Fn(u16) -> bool,
     ) -> (Setpoint, Vec<Event>) {
+        self.note_height(percept);
         let (mut setpoint, events) = self.steer(percept, is_open);
         let (airframe, attitude) = (&self.transit.airframe, percept.attitude);
         let Some((gimbal, attitude)) = airframe.mount.gimbal().zip(attitude) else {

@@ -319,6 +319,7 @@ impl Executive {
             .map_or(0, |p| p.percept.takes_off_in_ms);
         self.ms(length_m)
             .saturating_add(ground_ms)
+            .saturating_add(self.to_layer_ms())
             .min(UNREACHABLE_MS)
     }
 

@@ -3,6 +3,7 @@
 //! [`envelope`] has the last word.
 
 pub mod air;
+pub mod climb;
 pub mod envelope;
 pub mod follow;
 pub mod gaze;

@@ -132,6 +132,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/tracks.json5"),
     ),
     (
+        "volume",
+        "volume.json5",
+        include_str!("../../../configs/trials/volume.json5"),
+    ),
+    (
         "swarm_20",
         "swarm_20.json5",
         include_str!("../../../configs/trials/swarm_20.json5"),

@@ -50,6 +50,8 @@ mod read;
 mod request;
 mod resolve;
 pub mod town;
+#[cfg(test)]
+mod volumes;
 
 pub use builtin::{
     DEFAULT, files as builtin_files, load_builtin, names as builtin_names, text as builtin_text,

@@ -4,8 +4,8 @@
 
 use crate::flight_model::turn_radius_m;
 use crate::mounts::{check_mounts, held_footprint_m};
-use crate::read::Stated;
 use crate::read::targets::Asked;
+use crate::read::{Stated, layers};
 use crate::request::AreaPlanner;
 use skein_flight::airframe::Airframe;
 use skein_flight::trajectory::wind::Wind;
@@ -77,6 +77,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         },
         lap: 0,
         further_laps: laps(s)? - 1,
+        layers: layers::of_fleet(&s.layers_m, &s.fleet),
         added_zones: BTreeMap::new(),
         sortie: 0,
         cancelled: false,
@@ -95,6 +96,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         },
     };
     check_mounts(s)?;
+    layers::check(s, &mission)?;
     check_separation(s, &mission)?;
     check_diagram(s, &mission)?;
     check_brought(s, &mission)?;
@@ -126,6 +128,9 @@ fn turning(s: &Stated) -> Result<f64, Error> {
 /// How far UAVs sense each other, metres: what is stated, or what flying at one height asks
 /// for.
 pub(crate) fn traffic_range_m(s: &Stated, mission: &Mission) -> f64 {
+    if mission.layers.is_some() {
+        return layers::SENSED_M;
+    }
     if s.fleet.separation_m <= 0.0 {
         return 0.0;
     }
@@ -191,7 +196,7 @@ fn laps(s: &Stated) -> Result<u16, Error> {
             "exact passes are flown once; for several laps take planner \"lanes\"",
         ));
     }
-    Ok(s.laps)
+    layers::laps(s)
 }
 
 fn centre(area: &Polygon) -> Point {

@@ -10,7 +10,7 @@ use crate::mission::mission;
 use crate::mission::traffic_range_m;
 use crate::read::fleet::{Fleet, Member};
 use crate::read::targets::Asked;
-use crate::read::{self, Stated, operator};
+use crate::read::{self, Stated, layers, operator};
 use crate::request::{AreaPlanner, Overrides};
 use skein_geometry::frame::Pose;
 use skein_netsim::fault::TimedFault;
@@ -150,7 +150,7 @@ fn spec(s: &Stated, geometry: &MissionGeometry) -> Spec {
         vehicles: s.vehicles.clone(),
         contour: s.contour.clone(),
         faults: with_operator(s),
-        storm: s.storm,
+        storm: layers::storm(s),
         seed: s.run.seed,
     }
 }

@@ -39,6 +39,24 @@ pub struct Airframe {
     /// How the camera is held: both halves are those of a picture from straight above.
     #[serde(default, skip_serializing_if = "Mount::is_level")]
     pub mount: Mount,
+    /// How fast it climbs and descends at any airspeed, m/s.
+    #[serde(default = "usual_climb_mps", skip_serializing_if = "is_usual_climb")]
+    pub climb_mps: f64,
+}
+
+/// How fast an airframe climbs that does not say so, m/s: what small fixed wings do at cruise.
+pub const CLIMB_MPS: f64 = 3.0;
+
+fn usual_climb_mps() -> f64 {
+    CLIMB_MPS
+}
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde hands over a reference"
+)]
+fn is_usual_climb(climb_mps: &f64) -> bool {
+    climb_mps.to_bits() == CLIMB_MPS.to_bits()
 }
 
 impl Airframe {
@@ -177,6 +195,7 @@ mod tests {
             footprint_across_m: 20.0,
             footprint_along_m: 15.0,
             mount: Mount::Level,
+            climb_mps: CLIMB_MPS,
         };
         let p = PowerModel::of(&a);
         assert!((p.share(13.0, 0.0) - 1.0).abs() < 1e-12);

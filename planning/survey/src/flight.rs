@@ -3,7 +3,7 @@
 
 use crate::flown;
 use crate::team::Uav;
-use skein_flight::airframe::{Airframe, GRAVITY_MPS2, PowerModel};
+use skein_flight::airframe::{Airframe, CLIMB_MPS, GRAVITY_MPS2, PowerModel};
 use skein_flight::mount::Mount;
 use skein_geometry::Curve;
 use skein_geometry::frame::Point;
@@ -79,6 +79,7 @@ impl Flight {
             footprint_across_m: 0.0,
             footprint_along_m: 0.0,
             mount: Mount::Level,
+            climb_mps: CLIMB_MPS,
         });
         let turned_rad: f64 = self
             .track

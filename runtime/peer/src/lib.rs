@@ -111,6 +111,7 @@ pub mod hint;
 mod inbound;
 pub mod input;
 pub mod journal;
+pub mod layers;
 pub mod mission;
 mod mission_change;
 pub mod mission_edit;

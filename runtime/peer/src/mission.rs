@@ -4,6 +4,7 @@ use crate::count_site::{CountSite, SITES_MAX};
 use crate::criteria::{CRITERIA_MAX, Criterion};
 use crate::diagram::{Diagram, DiagramError, Machine, check};
 use crate::input::NewTask;
+use crate::layers::Layers;
 use crate::offload::MissionGeometry;
 use crate::streets::Streets;
 use crate::task::CoverageTask;
@@ -106,6 +107,9 @@ pub struct Mission {
     /// The streets whose use is measured, and by which ways are asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub streets: Option<Arc<Streets>>,
+    /// At which heights its laps are flown; all at one where none are said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layers: Option<Arc<Layers>>,
 }
 
 /// Whether a field need not be said.
@@ -174,6 +178,9 @@ pub enum GeometryError {
     /// Its streets make no network, or a way that is asked for is not on them.
     #[error("streets.{0}: {1}")]
     Streets(String, String),
+    /// Its layers cannot be flown.
+    #[error("layers: {0}")]
+    Layers(String),
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -328,6 +335,10 @@ impl Mission {
             h.write_i64(-8);
             streets.hash(&mut h);
         }
+        if let Some(layers) = &self.layers {
+            h.write_i64(-9);
+            layers.hash(&mut h);
+        }
         h.finish()
     }
 
@@ -345,7 +356,8 @@ impl Mission {
 
     /// Whether a revision is this one or another lap of the same patrol, as far as its number
     /// tells.
-    pub(crate) fn has_lap_of(&self, revision: u32) -> bool {
+    #[must_use]
+    pub fn has_lap_of(&self, revision: u32) -> bool {
         let edited = u32::from(self.edit()) << 16;
         let first = if edited > 0 {
             edited
@@ -413,8 +425,8 @@ impl Mission {
     pub fn machine(&self) -> Result<Machine, DiagramError> {
         let diagram = self.flown_by();
         if self.diagram.is_some() {
-            let (again, apart) = (self.is_patrol(), self.separation_mm > 0);
-            check::fits(&diagram, self.task.dimension(), again, apart)?;
+            let (again, apart) = (self.sees_again(), self.separation_mm > 0);
+            check::fits(&diagram, self.dimension(), again, apart)?;
         }
         Machine::new(&diagram)
     }
@@ -500,6 +512,7 @@ impl Mission {
         self.check_detections()?;
         self.check_counts()?;
         self.check_streets()?;
+        self.check_layers().map_err(GeometryError::Layers)?;
         if self.tasks.len() > BROUGHT_MAX || self.brought(false).len() < self.tasks.len() {
             let text = format!("at most {BROUGHT_MAX} fit, each as an operator may ask for it");
             return Err(GeometryError::Tasks(text));
@@ -514,6 +527,8 @@ impl Mission {
         let router = Router::new(zones, limits);
         let coverage_loop = coverage_loop.of_lap(self.lap).of_sortie(self.sortie);
         let coverage_loop = coverage_loop.of_edit(self.edit());
+        let heights = self.layers.as_ref().map_or(0, |l| l.bits());
+        let coverage_loop = coverage_loop.of_heights(heights);
         let geometry = MissionGeometry::new(Arc::clone(self), coverage_loop, router);
         Ok(Arc::new(geometry))
     }
@@ -740,6 +755,7 @@ mod tests {
             tasks: Vec::new(),
             counts: Vec::new(),
             streets: None,
+            layers: None,
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,
@@ -905,7 +921,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 42] = [
+        let changes: [fn(&mut Mission); 45] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -956,6 +972,17 @@ mod tests {
                 let mut streets = crate::streets::tests::block();
                 streets.ways[0].places[1].0 += 1;
                 m.streets = Some(Arc::new(streets));
+            },
+            |m| m.layers = Some(Arc::new(crate::layers::tests::three())),
+            |m| {
+                let mut layers = crate::layers::tests::three();
+                layers.heights_mm[2] += 1;
+                m.layers = Some(Arc::new(layers));
+            },
+            |m| {
+                let mut layers = crate::layers::tests::three();
+                layers.slots += 1;
+                m.layers = Some(Arc::new(layers));
             },
             |m| m.counts.push(crossing(0)),
             |m| m.counts.push(crossing(1)),

@@ -10,6 +10,7 @@ use crate::protocol::Negotiation;
 use crate::separation::{Rules, Separation};
 use crate::wire::message::{Claim, Member};
 use skein_behaviors::Executive;
+use skein_behaviors::reactive::climb::Climb;
 use skein_flight::coverage::ring::patch::Patches;
 use skein_flight::coverage::ring::{CellId, CoverageLoop};
 use std::collections::{BTreeSet, VecDeque};
@@ -32,6 +33,14 @@ pub(crate) fn executive_for(geometry: &MissionGeometry, config: &PeerConfig) -> 
         .with_late_ms(config.beacon_period_ms);
     Some(if mission.separation_mm > 0 {
         executive.with_promises()
+    } else if let Some(layers) = &mission.layers {
+        let slots = layers.slots();
+        let lowest_m = slots.layers_m.first().copied();
+        let offset_m = config.height_m - lowest_m.unwrap_or(config.height_m);
+        let own = (config.id.0, offset_m);
+        let speeds_mps = (airframe.climb_mps, layers.fastest_mps());
+        let layer = layers.of_lap(mission.lap);
+        executive.with_layer(Climb::new(slots, own, layer, speeds_mps))
     } else {
         executive
     })
@@ -64,11 +73,13 @@ const REMEMBERED: usize = 5;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SeenBefore(VecDeque<(Begun, u64, CellSet)>);
 
-/// Every lap begins with nothing covered, and every mission that is begun anew.
-type Begun = (u16, u16);
+/// Every lap begins with nothing covered, and every mission that is begun anew, or flown at
+/// other heights.
+type Begun = (u16, u16, u64);
 
 fn begun(mission: &Mission) -> Begun {
-    (mission.lap, mission.sortie)
+    let heights = mission.layers.as_ref().map_or(0, |l| l.bits());
+    (mission.lap, mission.sortie, heights)
 }
 
 impl SeenBefore {

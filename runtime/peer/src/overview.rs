@@ -1,11 +1,12 @@
 //! What a peer knows of the mission, for a person who asks: what is flown, who follows which
 //! revision of it, how far it is. Asking changes nothing.
 
+use crate::layers::Layer;
 use crate::mission::{Mission, PointMm};
 use crate::mission_edit::is_zone_name;
 use crate::output::Status;
 use crate::task_desk::TaskView;
-use crate::why::{Other, Work};
+use crate::why::{LayerFlown, Other, Work};
 use crate::wire::message::{Order, Orders};
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -24,6 +25,9 @@ pub struct Overview {
     pub lap: u16,
     /// How many laps follow.
     pub further_laps: u16,
+    /// In which layer that lap is flown, where there are some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layer: Option<Layer>,
     /// Whether the operator ended it.
     pub cancelled: bool,
     /// Latitude of the origin, degrees.
@@ -67,6 +71,7 @@ impl Overview {
             sortie: mission.sortie,
             lap: mission.lap,
             further_laps: mission.further_laps,
+            layer: mission.layer(),
             cancelled: mission.cancelled,
             origin_lat_deg: f64::from(mission.origin_lat_e7) / 1e7,
             origin_lon_deg: f64::from(mission.origin_lon_e7) / 1e7,
@@ -122,6 +127,10 @@ impl fmt::Display for Overview {
         if self.lap > 0 || self.further_laps > 0 {
             let laps = u32::from(self.lap) + u32::from(self.further_laps) + 1;
             writeln!(f, "  lap       {} of {laps}", u32::from(self.lap) + 1)?;
+        }
+        if let Some(layer) = self.layer {
+            let next_mm = None;
+            writeln!(f, "  layer     {}", LayerFlown { layer, next_mm })?;
         }
         writeln!(
             f,

@@ -18,7 +18,7 @@ use crate::{Beliefs, Command, CoverageTask, Input, Output, Peer, PeerConfig, Pee
 use crate::{Report, Role, Time, Transmission};
 use skein_behaviors::reactive::follow::fly;
 use skein_behaviors::{Order, Percept, Setpoint, Steer};
-use skein_flight::airframe::Airframe;
+use skein_flight::airframe::{Airframe, CLIMB_MPS};
 use skein_flight::coverage::ring::Tree;
 use skein_flight::coverage::ring::division::Rule;
 use skein_flight::mount::Mount;
@@ -71,6 +71,7 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         tasks: Vec::new(),
         counts: Vec::new(),
         streets: None,
+        layers: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,
@@ -91,6 +92,7 @@ pub fn airframe() -> Airframe {
         footprint_across_m: 46.0,
         footprint_along_m: 36.0,
         mount: Mount::Level,
+        climb_mps: CLIMB_MPS,
     }
 }
 

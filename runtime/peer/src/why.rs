@@ -7,6 +7,8 @@ use crate::cells::CellSet;
 use crate::diagram::MissionEvent;
 use crate::diagram::StateGoal;
 use crate::input::Time;
+use crate::layers::Layer;
+use crate::mission::mm;
 use crate::mission_state::MissionState;
 use crate::output::Status;
 use crate::task_desk::TaskView;
@@ -223,6 +225,37 @@ pub struct PastEvent {
     pub text: String,
 }
 
+/// A layer of a mission, as one UAV flies it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LayerFlown {
+    /// Which it is.
+    pub layer: Layer,
+    /// On the way there, to which height it flies now: where it may stay until others leave it
+    /// the room; mm above the origin.
+    pub next_mm: Option<i32>,
+}
+
+impl fmt::Display for LayerFlown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Layer { nth, of, height_mm } = self.layer;
+        let m = |mm: f64| mm / 1000.0;
+        write!(
+            f,
+            "{} of {of}, from {:.0} m up",
+            nth + 1,
+            m(height_mm.into())
+        )?;
+        match self.next_mm {
+            Some(mm) => write!(
+                f,
+                "; on the way there, at most to {:.1} m until others leave it the room",
+                m(mm.into())
+            ),
+            None => Ok(()),
+        }
+    }
+}
+
 /// The mission as one peer follows it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Work {
@@ -250,6 +283,9 @@ pub struct Work {
     /// What is done in that state, for a person.
     #[serde(default)]
     pub does: String,
+    /// In which layer it flies, where its mission has some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layer: Option<LayerFlown>,
     /// Whether it takes part in planning.
     pub able: bool,
     /// Its open cells that come next, in order of flight.
@@ -343,6 +379,15 @@ fn spacing(gaps: Gaps) -> String {
     format!("the next one is {ahead_m:.0} m ahead and the last one {behind_m:.0} m behind")
 }
 
+fn layer(state: &MissionState) -> Option<LayerFlown> {
+    let layer = state.geometry.mission.layer()?;
+    let changes = state.executive.as_ref().filter(|e| e.changes_layer());
+    Some(LayerFlown {
+        layer,
+        next_mm: changes.map(|e| mm(e.height_m())),
+    })
+}
+
 pub(crate) fn work(state: &MissionState, now: Time) -> Work {
     let sections = &state.negotiation.sections;
     let coverage_loop = &state.geometry.coverage_loop;
@@ -375,6 +420,7 @@ pub(crate) fn work(state: &MissionState, now: Time) -> Work {
         state: at.name.clone(),
         state_ms: state.stage.state_ms(now),
         does,
+        layer: layer(state),
         able: state.able(),
         next_cells: open.iter().copied().take(NEXT_CELLS).collect(),
         open_cells: open.len(),
@@ -470,6 +516,9 @@ impl Why {
                 f,
                 "  state     {state} of the diagram {diagram}, for {since_s:.1} s"
             )?;
+        }
+        if let Some(layer) = &work.layer {
+            writeln!(f, "  layer     {layer}")?;
         }
         let (counter, hash) = (work.epoch.counter, work.epoch.hash);
         writeln!(f, "  epoch     {counter}.{hash:08x}")?;

@@ -47,6 +47,11 @@ const DIAGRAMS: &[(&str, &str, &str)] = &[
         include_str!("../../../../configs/diagrams/trace.json5"),
     ),
     (
+        "volume",
+        "volume.json5",
+        include_str!("../../../../configs/diagrams/volume.json5"),
+    ),
+    (
         "weather",
         "weather.json5",
         include_str!("../../../../configs/diagrams/weather.json5"),
@@ -126,10 +131,11 @@ pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Di
         "tasks",
         "counts",
         "streets",
+        "layers_m",
     ])?;
     let at = match f.get("diagram") {
         None if f.get("for_s").is_none()
-            && ["detections", "tasks", "counts", "streets"]
+            && ["detections", "tasks", "counts", "streets", "layers_m"]
                 .iter()
                 .any(|name| f.get(name).is_some()) =>
         {

@@ -43,6 +43,8 @@ pub(crate) struct Fleet {
     /// What any two keep between them by agreement, all at one height, metres; 0 where each
     /// has a height of its own.
     pub(crate) separation_m: f64,
+    /// From one UAV's height slot to the next above it, metres.
+    pub(crate) slot_step_m: f64,
     /// How far UAVs sense each other, metres, where the file says so.
     pub(crate) traffic_range_m: Option<f64>,
     pub(crate) members: Vec<Member>,
@@ -161,6 +163,7 @@ pub(crate) fn read(
     Ok(Fleet {
         key,
         separation_m,
+        slot_step_m: step_m,
         traffic_range_m,
         members,
     })

@@ -7,6 +7,7 @@ pub(crate) mod detections;
 pub(crate) mod faults;
 pub(crate) mod fleet;
 pub(crate) mod lanes;
+pub(crate) mod layers;
 pub(crate) mod operator;
 pub(crate) mod radio;
 pub(crate) mod run;
@@ -103,6 +104,8 @@ pub(crate) struct Stated {
     pub(crate) counts: Vec<CountSite>,
     /// The streets of the mission.
     pub(crate) streets: Option<Arc<Streets>>,
+    /// Heights at each of which all is to be seen, metres; none where all is flown at one.
+    pub(crate) layers_m: Vec<f64>,
     /// By what rule the loop is divided.
     pub(crate) division: Rule,
     pub(crate) lanes: Lanes,
@@ -202,6 +205,9 @@ pub(crate) fn scenario(
             .get("mission")
             .map_or(Ok(Vec::new()), counts::of_mission)?,
         streets,
+        layers_m: f.get("mission").map_or(Ok(Vec::new()), |node| {
+            layers::of_mission(node, terrain.level_m)
+        })?,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f

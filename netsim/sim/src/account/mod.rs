@@ -467,6 +467,7 @@ impl Account {
             contour: self.contour.clone(),
             counts: self.counts.clone(),
             streets: self.streets.clone(),
+            layers: ending.judge.layers().into_iter().map(Into::into).collect(),
             found_ms: self.found_ms,
             over_ms: self.over_ms,
             finished,

@@ -13,7 +13,7 @@ use crate::check::footprint::FootprintErrors;
 use crate::check::streets::StreetsReport;
 use crate::check::wind::WindErrors;
 use crate::check::{Findings, Violation};
-use crate::world::Judge;
+use crate::world::{Judge, LayerSeen};
 use serde::{Deserialize, Serialize};
 use skein_link::{RadioCounters, Reason};
 use std::collections::BTreeMap;
@@ -103,6 +103,9 @@ pub struct RunReport {
     /// true.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub streets: Option<StreetsReport>,
+    /// Each lap of a mission that is flown in layers: when all of it was seen from there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<LayerReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
     /// Live UAVs at the end that hold a relay position, with everything covered.
@@ -122,6 +125,45 @@ pub struct RunReport {
     pub simulated: Option<Simulated>,
     /// What only a live trial can tell.
     pub live: Option<Live>,
+}
+
+/// What came of one lap of a mission that is flown in layers, by the true heights of who looked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LayerReport {
+    /// Which lap, from 1.
+    pub lap: u16,
+    /// The lowest slot of its layer above the origin, m.
+    pub height_m: f64,
+    /// When the last of its cells was seen, ms.
+    pub seen_ms: Option<u64>,
+    /// Cells that were not seen from there.
+    pub lacking: usize,
+}
+
+impl LayerReport {
+    /// The same in a line.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let (lap, height_m) = (self.lap, self.height_m);
+        match self.seen_ms {
+            Some(ms) => format!(
+                "{height_m} m (lap {lap}): all seen at {:.1} s",
+                super::secs(ms)
+            ),
+            None => format!("{height_m} m (lap {lap}): {} cells not seen", self.lacking),
+        }
+    }
+}
+
+impl From<LayerSeen> for LayerReport {
+    fn from(seen: LayerSeen) -> Self {
+        Self {
+            lap: seen.lap,
+            height_m: seen.height_m,
+            seen_ms: seen.seen_ms,
+            lacking: seen.lacking,
+        }
+    }
 }
 
 /// What moved the run on.

@@ -41,6 +41,9 @@ impl fmt::Display for RunReport {
         for line in self.streets.iter().flat_map(StreetsReport::lines) {
             writeln!(f, "  streets    {line}")?;
         }
+        for layer in &self.layers {
+            writeln!(f, "  layer      {}", layer.line())?;
+        }
         self.write_radio(f)?;
         self.write_checks(f)?;
         for alarm in &self.alarms {

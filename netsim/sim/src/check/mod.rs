@@ -11,6 +11,7 @@
 //! | [`graph`] | the true components, from which liveness is counted |
 //! | [`bounds`] | how long things may take, and how loss grades that |
 //! | [`membership`] | detection of deaths, false downs, L1 |
+//! | [`layers`] | each layer of a volume was seen from within it |
 //! | [`listing`] | I1, L2, S5: which peer lists which cell |
 //! | [`record`] | S3, S4, S7, S11: versions, speakers, promises |
 //! | [`cover`] | S3 (covered), S6, L4: what is marked covered |
@@ -55,6 +56,7 @@ pub mod footprint;
 pub mod fuel;
 pub mod graph;
 pub mod handicaps;
+pub mod layers;
 pub mod listing;
 pub mod membership;
 pub mod patience;

@@ -10,6 +10,7 @@ use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
 use super::footprint::FootprintCheck;
 use super::fuel::FuelCheck;
+use super::layers::LayerCheck;
 use super::listing::ListingCheck;
 use super::patience::PatienceCheck;
 use super::record::Said;
@@ -72,6 +73,8 @@ pub struct Rules {
     pub counts: CountCheck,
     /// How its streets are used.
     pub streets: StreetCheck,
+    /// Whether each of its layers was seen.
+    pub layers: LayerCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -110,6 +113,7 @@ impl Rules {
             contours: ContourCheck::default(),
             counts: CountCheck::default(),
             streets: StreetCheck::default(),
+            layers: LayerCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),

@@ -1,7 +1,7 @@
 //! Scenes: who begins where, and wants to go where.
 
 use super::{all_apart, beside};
-use skein_flight::airframe::Airframe;
+use skein_flight::airframe::{Airframe, CLIMB_MPS};
 use skein_flight::mount::Mount;
 use skein_flight::separation::motion::{heading_e7, to_mm, to_signed_mm};
 use skein_flight::separation::{Detours, End, Motion, MotionPlan, Stretch};
@@ -106,6 +106,7 @@ fn airframe(cruise_mps: f64) -> Airframe {
         footprint_across_m: 40.0,
         footprint_along_m: 30.0,
         mount: Mount::Level,
+        climb_mps: CLIMB_MPS,
     }
 }
 

@@ -33,7 +33,7 @@ use judge::{Judge, Look};
 use nalgebra::Matrix2;
 use roads::Roads;
 use sensor::{Noise, Seen};
-use skein_flight::airframe::Airframe;
+use skein_flight::airframe::{Airframe, CLIMB_MPS};
 use skein_flight::mount::Mount;
 use skein_flight::tracking::bend::Guard;
 use skein_flight::tracking::estimate::{Detection, Estimate};
@@ -142,6 +142,7 @@ pub fn airframe() -> Airframe {
         footprint_across_m: 40.0,
         footprint_along_m: 30.0,
         mount: Mount::Level,
+        climb_mps: CLIMB_MPS,
     }
 }
 

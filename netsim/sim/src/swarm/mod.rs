@@ -43,6 +43,7 @@ pub use outcome::Outcome;
 mod tests;
 
 use crate::account::{Account, Cause};
+use crate::check::layers::is_judged;
 use crate::check::record::Said;
 use crate::check::{Checker, PeerSnapshot};
 use crate::fault::TimedFault;
@@ -51,7 +52,7 @@ use crate::history::{History, Kind, What, bytes_hash, pose_hash, report_hash, se
 use crate::prepared::Prepared;
 use crate::radio::{Delivery, Frame};
 use crate::spec::Spec;
-use crate::world::{Fact, Loss, percept_phase_ms};
+use crate::world::{Approach, Fact, Loss, percept_phase_ms};
 use air::Air;
 use judged_loop::JudgedLoop;
 use meter::{Meter, Part};
@@ -472,7 +473,7 @@ impl Swarm {
                 Fact::ZoneEntry {
                     at_ms, uav, zone, ..
                 } => self.checker.on_zone_entry(at_ms, uav, zone),
-                Fact::TooClose(approach) if self.spec.mission.separation_mm > 0 => {
+                Fact::TooClose(approach) if self.is_judged(&approach) => {
                     self.checker.on_too_close(&approach);
                 }
                 _ => {}
@@ -797,6 +798,7 @@ impl Swarm {
         self.note_voice(id, &report);
         self.note_task(id, &report);
         self.note_detection(id, &report);
+        self.note_finished(id, &report);
         if let Report::Refused { reason } = &report
             && !std::mem::take(&mut self.spoilt)
         {
@@ -1032,6 +1034,26 @@ impl Swarm {
             }
             _ => {}
         }
+    }
+
+    /// A UAV says that its mission is finished: the judge knows whether each layer was seen.
+    fn note_finished(&mut self, id: u16, report: &Report) {
+        let mission = self.operator.mission();
+        if let Report::Finished { revision } = report
+            && mission.has_lap_of(*revision)
+        {
+            self.air.advance(self.now_ms);
+            let (seen, rules) = (self.air.judge().layers(), &mut self.checker.rules);
+            let found = &mut self.checker.found;
+            rules
+                .layers
+                .on_finished((self.now_ms, id), mission, &seen, found);
+        }
+    }
+
+    fn is_judged(&self, approach: &Approach) -> bool {
+        let twins = self.names.twins();
+        is_judged(&self.spec.mission, approach, |number| twins.id_of(number))
     }
 
     /// A UAV says that it saw all of a task: the judge knows.

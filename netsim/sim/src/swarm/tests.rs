@@ -839,3 +839,61 @@ fn who_ignores_the_bank_claims_what_no_camera_saw() {
     let knowing = with_fixed_cameras(true);
     assert!(!knowing.iter().any(|rule| rule == "S6"), "{knowing:?}");
 }
+
+/// The fixture in two layers, with sensors that see all others.
+fn in_layers(n_uavs: u16) -> Spec {
+    let mut spec = (*prepared(n_uavs).spec).clone();
+    let mut mission = (*spec.mission).clone();
+    mission.further_laps = 1;
+    mission.layers = Some(Arc::new(skein_peer::layers::Layers {
+        heights_mm: vec![45_000, 85_000],
+        slot_mm: 5_000,
+        slots: n_uavs,
+        fastest_mmps: 16_000,
+    }));
+    spec.mission = Arc::new(mission);
+    (spec.traffic_range_m, spec.min_separation_m) = (5_000.0, 2.0);
+    spec
+}
+
+#[test]
+fn a_volume_is_seen_layer_by_layer_and_climbs_are_judged() {
+    for n_uavs in [1, 3] {
+        let o = run(&Prepared::new(in_layers(n_uavs)), 1, Vec::new(), false);
+        passed(&o);
+        let seen: Vec<u64> = o.report.layers.iter().filter_map(|l| l.seen_ms).collect();
+        assert!(seen.len() == 2 && seen[0] + 60_000 < seen[1], "{seen:?}");
+    }
+}
+
+/// Peers that know nothing of layers see all twice from one height, and say that they are done.
+#[test]
+fn who_marks_cells_at_the_wrong_height_breaks_the_rule() {
+    let layered = Prepared::new(in_layers(2));
+    let mut flat = in_layers(2);
+    let mission = skein_peer::Mission {
+        layers: None,
+        ..(*flat.mission).clone()
+    };
+    flat.mission = Arc::new(mission);
+    flat.max_time_s = 900;
+    let mut swarm = Swarm::new(&Prepared::new(flat), 1, Vec::new(), false);
+    swarm.air = Air::new(&layered, 1);
+    let o = swarm.run();
+    let counts = &o.report.violations.as_ref().unwrap().counts;
+    assert!(
+        counts.contains_key("layers") && counts.contains_key("S6"),
+        "{counts:?}"
+    );
+    let told = o.violations().iter().find(|v| v.check == "layers").unwrap();
+    assert!(
+        told.text
+            .contains("80 cells of lap 2 were not seen from the layer at 85 m"),
+        "{told}"
+    );
+    assert!(
+        !o.report.passed
+            && o.report.layers[0].seen_ms.is_some()
+            && o.report.layers[1].lacking == 80
+    );
+}

@@ -2,6 +2,7 @@
 
 use super::camera::{Eye, Picture};
 use super::fact::Fact;
+use super::layers::{LayerBook, LayerSeen};
 use super::motion::Piece;
 use super::pieces::Pieces;
 use super::survey::{Cell, Survey};
@@ -46,6 +47,8 @@ pub(super) struct Board {
     marks: u64,
     /// How often it is seen again, where the mission goes on once everything is seen.
     watch: Option<Watch>,
+    /// At which heights what is seen counts, lap by lap.
+    layers: LayerBook,
 }
 
 fn is_coverable(cell: &Cell) -> bool {
@@ -66,8 +69,15 @@ impl Board {
             longest_gap_ms: 0,
             marks: 0,
             watch: None,
+            layers: LayerBook::of(survey.layers()),
             survey,
         }
+    }
+
+    /// What came of each lap that is flown in a layer.
+    pub(super) fn layers(&self) -> Vec<LayerSeen> {
+        let so_far = (self.lap, self.n_covered, self.n_coverable);
+        self.layers.seen(so_far, self.laps)
     }
 
     /// From now on what was seen is looked at again.
@@ -93,7 +103,7 @@ impl Board {
     /// squares of one grid, or pieces with the same corners; nothing where the mission was
     /// begun anew.
     pub(super) fn remember(&mut self, other: &Self) {
-        if self.survey.sortie() != other.survey.sortie() {
+        if self.survey.sortie() != other.survey.sortie() || !self.layers.goes_on(&other.layers) {
             return;
         }
         for i in 0..self.seen.len() {
@@ -143,7 +153,9 @@ impl Board {
 
     pub(super) fn longest_gap_ms(&self) -> Option<u64> {
         let again = self.watched_gap_ms(0);
-        again.or((self.laps > 1).then_some(self.longest_gap_ms))
+        // From another layer nothing is seen again.
+        let laps = self.laps > 1 && self.layers.is_flat();
+        again.or(laps.then_some(self.longest_gap_ms))
     }
 
     pub(super) fn sighting(&self, cell: CellId) -> Option<Sighting> {
@@ -229,6 +241,10 @@ impl Board {
     }
 
     pub(super) fn look(&mut self, uav: u16, eye: &Eye<'_>, piece: &Piece, facts: &mut Vec<Fact>) {
+        self.layers.looks_from(eye.height_m);
+        if !self.layers.counts_until(self.lap) {
+            return;
+        }
         let length_m = piece.length_m();
         let reach_m = self.reach_m(eye) + length_m;
         let new = match self.survey.pieces() {
@@ -330,7 +346,15 @@ impl Board {
         if let Some(watch) = &mut self.watch {
             watch.see(i, sighting.at_ms);
         }
-        if self.seen[i].is_some() {
+        // Each cell counts from within the layer of its own next lap: the last one of a lap may
+        // have been seen in the middle of a picture, and one that need not be seen may be behind.
+        let lap = self.times[i].0.saturating_add(1);
+        if self.seen[i].is_some() || !self.layers.counts(lap) {
+            return;
+        }
+        if !self.layers.is_flat() && lap < self.lap {
+            self.times[i] = (lap, sighting.at_ms);
+            self.marks += 1;
             return;
         }
         self.seen[i] = Some(sighting);
@@ -349,6 +373,9 @@ impl Board {
             self.longest_gap_ms = self.longest_gap_ms.max(gap_ms);
         }
         self.times[i] = (times + 1, sighting.at_ms);
+        if self.n_covered == self.n_coverable {
+            self.layers.done(self.lap, sighting.at_ms);
+        }
         self.next_lap();
     }
 

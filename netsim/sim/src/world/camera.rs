@@ -142,6 +142,8 @@ pub struct Eye<'a> {
     pub along_m: f64,
     /// What turns, and from how high above the ground, metres; none where it is level.
     turned: Option<(&'a Camera, f64)>,
+    /// How high it truly is, metres above the origin.
+    pub height_m: f64,
 }
 
 /// An airframe alone has a level camera.
@@ -151,6 +153,7 @@ impl From<&Airframe> for Eye<'_> {
             across_m: airframe.footprint_across_m,
             along_m: airframe.footprint_along_m,
             turned: None,
+            height_m: 0.0,
         }
     }
 }
@@ -162,6 +165,7 @@ impl<'a> Eye<'a> {
         let turned = (!airframe.mount.is_level()).then_some((camera, height_m));
         Self {
             turned,
+            height_m,
             ..Self::from(airframe)
         }
     }

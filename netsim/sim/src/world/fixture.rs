@@ -4,7 +4,7 @@
 
 use crate::fault::{Fault, TimedFault};
 use crate::spec::{Building, GroundStationSpec, RadioSpec, Spec, StormSpec, TroubleSpec, UavSpec};
-use skein_flight::airframe::Airframe;
+use skein_flight::airframe::{Airframe, CLIMB_MPS};
 use skein_flight::mount::Mount;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Pose};
@@ -35,6 +35,7 @@ pub fn airframe() -> Airframe {
         footprint_across_m: 46.0,
         footprint_along_m: 36.0,
         mount: Mount::Level,
+        climb_mps: CLIMB_MPS,
     }
 }
 
@@ -178,6 +179,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         tasks: Vec::new(),
         counts: Vec::new(),
         streets: None,
+        layers: None,
         tree: skein_flight::coverage::ring::Tree::default(),
         division: Default::default(),
         separation_mm: 0,

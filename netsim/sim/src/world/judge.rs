@@ -6,6 +6,7 @@
 use super::board::Board;
 use super::camera::Eye;
 use super::fact::{Approach, Fact};
+use super::layers::LayerSeen;
 use super::motion::Piece;
 use super::no_fly::{TurnAway, Zones};
 use super::obstacles::Place;
@@ -56,6 +57,13 @@ impl Judge {
             self.board_mut().watch_again();
         }
         self
+    }
+
+    /// What came of each lap that is flown in a layer, by the true heights of who looked; nothing
+    /// where all is flown at one.
+    #[must_use]
+    pub fn layers(&self) -> Vec<LayerSeen> {
+        self.board().layers()
     }
 
     fn board(&self) -> &Board {

@@ -13,6 +13,7 @@ pub mod fixture;
 pub mod flat;
 pub mod judge;
 mod launcher;
+mod layers;
 pub mod motion;
 mod no_fly;
 pub mod obstacles;
@@ -25,6 +26,7 @@ mod watch;
 
 pub use fact::{Approach, Fact};
 pub use judge::{Judge, Sighting};
+pub use layers::LayerSeen;
 pub use motion::kinematic::Loss;
 pub use no_fly::TurnAway;
 pub use obstacles::{Obstacles, Place};
@@ -478,11 +480,18 @@ impl World {
         let airborne = others.filter(|u| u.body.airborne()).filter(flies);
         let near = airborne.map(|u| ((u.body.position() - at).norm(), u));
         let mut near: Vec<_> = near.filter(|(m, _)| *m <= self.traffic_range_m).collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Who changes layers has to know of all that are about as high; else the nearest count.
+        let high_m = self.body(uav).map_or(0.0, Kinematic::height_m);
+        let key = |(away_m, u): &(f64, &Uav)| match self.judge.survey().layers() {
+            Some(_) => (u.body.height_m() - high_m).abs(),
+            None => *away_m,
+        };
+        near.sort_by(|a, b| key(a).total_cmp(&key(b)));
         let sighting = |(_, u): (f64, &Uav)| Seen {
             id: u.id,
             east_dm: mm(u.body.position().x) / 100,
             north_dm: mm(u.body.position().y) / 100,
+            height_dm: mm(u.body.height_m()) / 100,
         };
         Traffic::new(self.traffic_range_m, near.into_iter().map(sighting))
     }

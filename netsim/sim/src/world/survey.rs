@@ -23,6 +23,7 @@ use skein_geometry::math::{PI, sin_cos};
 use skein_geometry::{Polygon, PolygonError};
 use skein_peer::CoverageTask;
 use skein_peer::Mission;
+use skein_peer::layers::Layers;
 use skein_peer::offload::MissionGeometry;
 use std::sync::Arc;
 
@@ -103,6 +104,8 @@ pub struct Survey {
     pieces: Option<Pieces>,
     /// Which of the missions that the operator began anew it is of.
     sortie: u16,
+    /// At which heights its laps are flown.
+    layers: Option<Arc<Layers>>,
 }
 
 impl Survey {
@@ -136,6 +139,7 @@ impl Survey {
             area_m2: area_m2(&area).abs(),
             pieces: mission.pieces().map(Pieces::new),
             sortie: mission.sortie,
+            layers: mission.layers.clone(),
         };
         if mission.cancelled {
             // Nothing of it is to be seen any more.
@@ -206,6 +210,12 @@ impl Survey {
     #[must_use]
     pub fn sortie(&self) -> u16 {
         self.sortie
+    }
+
+    /// At which heights its laps are flown; none where all are flown at one.
+    #[must_use]
+    pub fn layers(&self) -> Option<&Layers> {
+        self.layers.as_deref()
     }
 
     /// The pieces of a mission for targets; none where cells of the area are to be seen.

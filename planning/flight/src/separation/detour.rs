@@ -232,6 +232,7 @@ mod tests {
             footprint_across_m: 40.0,
             footprint_along_m: 30.0,
             mount: crate::mount::Mount::Level,
+            climb_mps: crate::airframe::CLIMB_MPS,
         }
     }
 

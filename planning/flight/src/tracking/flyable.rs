@@ -60,6 +60,7 @@ pub(super) mod tests {
             footprint_across_m: 40.0,
             footprint_along_m: 30.0,
             mount: crate::mount::Mount::Level,
+            climb_mps: crate::airframe::CLIMB_MPS,
         }
     }
 

@@ -529,7 +529,7 @@ fn received(said: &Intent, now_ms: u64) -> Option<Statement<Motion>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skein_flight::airframe::Airframe;
+    use skein_flight::airframe::{Airframe, CLIMB_MPS};
     use skein_flight::mount::Mount;
     use skein_flight::separation::Stretch;
 
@@ -552,6 +552,7 @@ mod tests {
                     footprint_across_m: 40.0,
                     footprint_along_m: 30.0,
                     mount: Mount::Level,
+                    climb_mps: CLIMB_MPS,
                 },
                 separation_m: 50.0,
             },

@@ -1,6 +1,6 @@
 //! A kinematic fixed wing: constant airspeed and turn rate piece by piece, flown
-//! exactly (D2.7 §2.2, §2.4), in air that drifts with a constant wind. Climb and the
-//! lag of a real airframe belong to the dynamic model.
+//! exactly (D2.7 §2.2, §2.4), in air that drifts with a constant wind; it climbs at a constant
+//! rate whatever else it flies. The lag of a real airframe belongs to the dynamic model.
 //!
 //! A leg is a circular arc or a line from an anchor pose. The pose at any time comes
 //! from the anchor in closed form, so it does not depend on how often somebody asked.
@@ -129,6 +129,8 @@ pub enum Loss {
 pub struct Kinematic {
     airframe: Airframe,
     height_m: f64,
+    /// Where it begins.
+    slot_m: f64,
     launch: Pose,
     now_ms: u64,
     /// The leg being flown; `to_ms` is not used.
@@ -152,6 +154,7 @@ impl Kinematic {
         Self {
             airframe,
             height_m,
+            slot_m: height_m,
             launch,
             now_ms,
             leg: Piece {
@@ -217,7 +220,7 @@ impl Kinematic {
     /// A new airframe at the launch point.
     pub fn relaunch(&mut self, now_ms: u64) {
         let wind = self.leg.wind;
-        *self = Self::new(self.airframe, self.launch, self.height_m, now_ms).in_wind(wind);
+        *self = Self::new(self.airframe, self.launch, self.slot_m, now_ms).in_wind(wind);
     }
 
     /// Takes the airframe out of the air.
@@ -261,7 +264,7 @@ impl Kinematic {
         self.eye().picture_now(self.pose())
     }
 
-    /// Its height slot above the origin, metres.
+    /// Its height above the origin, metres.
     #[must_use]
     pub fn height_m(&self) -> f64 {
         self.height_m
@@ -312,6 +315,7 @@ impl Kinematic {
         let fresh_until_ms = setpoint.from_ms.min(now_ms) + FAILSAFE_MS;
         let future = setpoint.from_ms > now_ms + FAILSAFE_MS;
         let finite = setpoint.airspeed_mps.is_finite()
+            && setpoint.height_m.is_finite()
             && setpoint.steps.iter().all(|s| s.turn_rate_radps.is_finite())
             && setpoint.gimbal.iter().all(GimbalStep::is_finite);
         let older = self
@@ -357,6 +361,7 @@ impl Kinematic {
                 self.camera.follow(&self.airframe, &piece);
                 flown.push(piece);
             }
+            self.climb(next_ms - self.now_ms);
             self.fuel_ms -= next_ms - self.now_ms;
             self.now_ms = next_ms;
             if self.fuel_ms == 0 {
@@ -369,6 +374,16 @@ impl Kinematic {
             return;
         }
         self.now_ms = self.now_ms.max(to_ms);
+    }
+
+    /// Climbs or descends to the height that was commanded last, also under the failsafe: there
+    /// it may stay.
+    fn climb(&mut self, for_ms: u64) {
+        let Some(to_m) = self.setpoint.as_ref().map(|s| s.height_m) else {
+            return;
+        };
+        let most_m = self.airframe.climb_mps * seconds(for_ms);
+        self.height_m += (to_m - self.height_m).clamp(-most_m, most_m);
     }
 
     /// Turn rate and airspeed from now on, within the limits, and until when.
@@ -514,6 +529,37 @@ mod tests {
     use crate::world::fixture::airframe;
     use skein_behaviors::Steer;
     use skein_geometry::math::cos;
+
+    #[test]
+    fn it_climbs_at_its_rate_to_what_was_commanded_last_also_without_its_computer() {
+        let mut k = fresh();
+        let mut flown = Vec::new();
+        let up = Setpoint {
+            from_ms: 0,
+            airspeed_mps: 13.0,
+            height_m: 51.0,
+            steps: Vec::new(),
+            loiter: Side::Left,
+            gimbal: Vec::new(),
+        };
+        let none = Setpoint {
+            height_m: f64::NAN,
+            ..up.clone()
+        };
+        assert!(!k.apply(none, 0));
+        assert!(k.apply(up, 0));
+        k.advance(1_000, &mut flown);
+        assert!((k.height_m() - 48.0).abs() < 1e-9, "{}", k.height_m());
+        assert!((k.percept().unwrap().height_m - 48.0).abs() < 1e-9);
+        k.advance(9_000, &mut flown);
+        assert!(k.failsafe() && (k.height_m() - 51.0).abs() < 1e-9);
+        k.kill();
+        k.relaunch(10_000);
+        assert!(
+            (k.height_m() - 45.0).abs() < 1e-9,
+            "a new one is where it was launched"
+        );
+    }
 
     fn fresh() -> Kinematic {
         Kinematic::new(

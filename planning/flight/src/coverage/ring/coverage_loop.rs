@@ -226,6 +226,14 @@ impl CoverageLoop {
         self
     }
 
+    /// The same loop of a mission whose laps are flown at these heights, by their hash; 0 where
+    /// all are flown at one.
+    #[must_use]
+    pub fn of_heights(mut self, heights: u64) -> Self {
+        self.hash ^= heights;
+        self
+    }
+
     /// What identifies the loop in another lap than `lap`, which this one is of.
     #[must_use]
     pub fn hash_in_lap(&self, lap: u16, other: u16) -> u64 {

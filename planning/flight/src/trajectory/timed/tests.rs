@@ -18,6 +18,7 @@ fn airframe() -> Airframe {
         footprint_across_m: 20.0,
         footprint_along_m: 15.0,
         mount: crate::mount::Mount::Level,
+        climb_mps: crate::airframe::CLIMB_MPS,
     }
 }
 
