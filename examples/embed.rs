@@ -78,6 +78,7 @@ fn mission() -> Mission {
         tasks: Vec::new(),
         counts: Vec::new(),
         streets: None,
+        crowd: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,
@@ -155,6 +156,7 @@ impl Uav {
             traffic: Traffic::default(),
             sightings: Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
+            crowd: skein_behaviors::crowd::CrowdLook::default(),
             attitude: None,
         }
     }

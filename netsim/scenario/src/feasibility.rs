@@ -74,6 +74,7 @@ pub(crate) fn blamed(e: &GeometryError) -> &'static str {
         GeometryError::Tasks(_) => "mission.tasks",
         GeometryError::Counts(_) => "mission.counts",
         GeometryError::Streets(..) => "mission.streets",
+        GeometryError::Crowd(..) => "mission.crowd",
         GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
             "no_fly"
         }

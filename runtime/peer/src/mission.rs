@@ -2,6 +2,7 @@
 
 use crate::count_site::{CountSite, SITES_MAX};
 use crate::criteria::{CRITERIA_MAX, Criterion};
+use crate::crowd::CrowdWatch;
 use crate::diagram::{Diagram, DiagramError, Machine, check};
 use crate::input::NewTask;
 use crate::offload::MissionGeometry;
@@ -106,6 +107,9 @@ pub struct Mission {
     /// The streets whose use is measured, and by which ways are asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub streets: Option<Arc<Streets>>,
+    /// The mass event that is watched.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crowd: Option<Arc<CrowdWatch>>,
 }
 
 /// Whether a field need not be said.
@@ -174,6 +178,9 @@ pub enum GeometryError {
     /// Its streets make no network, or a way that is asked for is not on them.
     #[error("streets.{0}: {1}")]
     Streets(String, String),
+    /// The event that it watches has no sectors that can be seen, or no norm.
+    #[error("crowd.{0}: {1}")]
+    Crowd(&'static str, String),
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -327,6 +334,10 @@ impl Mission {
         if let Some(streets) = &self.streets {
             h.write_i64(-8);
             streets.hash(&mut h);
+        }
+        if let Some(crowd) = &self.crowd {
+            h.write_i64(-9);
+            crowd.hash(&mut h);
         }
         h.finish()
     }
@@ -491,6 +502,29 @@ impl Mission {
         checked.map_err(|(place, text)| GeometryError::Streets(place, text))
     }
 
+    /// Whether the event that it watches can be seen, sector by sector.
+    ///
+    /// # Errors
+    /// [`GeometryError::Crowd`] names the field and what is wrong.
+    pub fn check_crowd(&self) -> Result<(), GeometryError> {
+        let Some(crowd) = &self.crowd else {
+            return Ok(());
+        };
+        let wrong = |(field, text)| GeometryError::Crowd(field, text);
+        crowd.check().map_err(wrong)?;
+        let area = Polygon::new(self.area_m()).map_err(GeometryError::Area)?;
+        let half_mm = self.footprint_across_mm.min(self.footprint_along_mm);
+        let overlap_m = if self.task.is_area() {
+            2.0 * metres(self.footprint_across_mm) - self.lane_m()
+        } else {
+            let text =
+                "is watched by missions that cover an area: nobody flies past all of it else";
+            return Err(GeometryError::Crowd("area", text.to_owned()));
+        };
+        let checked = crowd.check_seen(&area, metres(half_mm), overlap_m);
+        checked.map_err(wrong)
+    }
+
     /// Derives the loop and the router.
     ///
     /// # Errors
@@ -500,6 +534,7 @@ impl Mission {
         self.check_detections()?;
         self.check_counts()?;
         self.check_streets()?;
+        self.check_crowd()?;
         if self.tasks.len() > BROUGHT_MAX || self.brought(false).len() < self.tasks.len() {
             let text = format!("at most {BROUGHT_MAX} fit, each as an operator may ask for it");
             return Err(GeometryError::Tasks(text));
@@ -740,6 +775,7 @@ mod tests {
             tasks: Vec::new(),
             counts: Vec::new(),
             streets: None,
+            crowd: None,
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,
@@ -905,7 +941,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 42] = [
+        let changes: [fn(&mut Mission); 44] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -956,6 +992,12 @@ mod tests {
                 let mut streets = crate::streets::tests::block();
                 streets.ways[0].places[1].0 += 1;
                 m.streets = Some(Arc::new(streets));
+            },
+            |m| m.crowd = Some(Arc::new(crate::crowd::tests::event())),
+            |m| {
+                let mut crowd = crate::crowd::tests::event();
+                crowd.dense_e2 += 1;
+                m.crowd = Some(Arc::new(crowd));
             },
             |m| m.counts.push(crossing(0)),
             |m| m.counts.push(crossing(1)),

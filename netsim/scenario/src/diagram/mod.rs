@@ -126,10 +126,11 @@ pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Di
         "tasks",
         "counts",
         "streets",
+        "crowd",
     ])?;
     let at = match f.get("diagram") {
         None if f.get("for_s").is_none()
-            && ["detections", "tasks", "counts", "streets"]
+            && ["detections", "tasks", "counts", "streets", "crowd"]
                 .iter()
                 .any(|name| f.get(name).is_some()) =>
         {

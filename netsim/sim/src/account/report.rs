@@ -8,6 +8,7 @@ use super::lifetimes::Cause;
 use super::tasks::TaskReport;
 use crate::check::contours::ContourReport;
 use crate::check::counts::CountReport;
+use crate::check::crowds::CrowdReport;
 use crate::check::detections::DetectionReport;
 use crate::check::footprint::FootprintErrors;
 use crate::check::streets::StreetsReport;
@@ -103,6 +104,9 @@ pub struct RunReport {
     /// true.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub streets: Option<StreetsReport>,
+    /// Who was told to be where at the event that the mission watches, beside what is true.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crowd: Option<CrowdReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
     /// Live UAVs at the end that hold a relay position, with everything covered.

@@ -5,6 +5,7 @@ use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
 use super::contours::{ContourCheck, Tracer};
 use super::counts::CountCheck;
+use super::crowds::CrowdCheck;
 use super::decision::{DecisionCheck, Mover};
 use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
@@ -72,6 +73,8 @@ pub struct Rules {
     pub counts: CountCheck,
     /// How its streets are used.
     pub streets: StreetCheck,
+    /// Who is where at the event that it watches.
+    pub crowds: CrowdCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -110,6 +113,7 @@ impl Rules {
             contours: ContourCheck::default(),
             counts: CountCheck::default(),
             streets: StreetCheck::default(),
+            crowds: CrowdCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -126,6 +130,7 @@ impl Rules {
         self.detections.on_mission(mission);
         self.counts.on_mission(mission);
         self.streets.on_mission(mission);
+        self.crowds.on_mission(mission);
         self.spread
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }
@@ -149,6 +154,7 @@ impl Rules {
         self.loops.remove(&id);
         self.cadence.on_boot(now_ms, id);
         self.activity.on_boot(now_ms, id);
+        self.crowds.on_boot(now_ms, id);
     }
 
     /// A process ends, with all that it knew, or stands still (`death` is false).
@@ -347,6 +353,7 @@ impl Rules {
         self.spoken.on_snapshot(snapshot, found);
         self.spread.on_snapshot(snapshot, found);
         self.tasks.on_snapshot(snapshot, found);
+        self.crowds.on_snapshot(snapshot, found);
         let flyers = (&self.flyers, &self.flight);
         self.relays.on_snapshot(snapshot, flyers, found);
         self.airtime.on_snapshot(snapshot, found);

@@ -78,7 +78,7 @@ fn limit_ms(snapshot: &Snapshot<'_>, bound_ms: u64, factor: u64, from_ms: u64) -
 }
 
 /// The same of what is counted on up to a tenth lost only.
-fn light_limit_ms(
+pub(super) fn light_limit_ms(
     snapshot: &Snapshot<'_>,
     bound_ms: u64,
     factor: u64,
@@ -93,6 +93,11 @@ fn record_ms(bounds: &Bounds, peers: usize) -> u64 {
     let rotation = (peers as u64).saturating_sub(1).div_ceil(GOSSIP_LEAST);
     let crowd = rotation.saturating_sub(SMALL_ROTATION) * bounds.diameter;
     bounds.spread_ms() + crowd * bounds.interval_ms
+}
+
+/// How long a record may take to all of so many, and how often that where it is lost now and then.
+pub(super) fn record_limit(bounds: &Bounds, peers: usize) -> (u64, u64) {
+    (record_ms(bounds, peers), RECORD_FACTOR)
 }
 
 /// Whether a record reaches everybody: passed on, and worth it for longer than the two

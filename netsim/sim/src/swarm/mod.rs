@@ -22,6 +22,7 @@
 //! | [`latency`] | how long a peer takes to answer one input |
 
 mod air;
+mod crowd;
 mod fault_effects;
 mod judged_loop;
 pub mod latency;
@@ -444,6 +445,7 @@ impl Swarm {
         self.note_counts(idx);
         self.note_footprint(idx);
         self.note_streets(idx);
+        self.note_crowd(idx);
     }
 
     fn advance_world(&mut self) {
@@ -797,6 +799,7 @@ impl Swarm {
         self.note_voice(id, &report);
         self.note_task(id, &report);
         self.note_detection(id, &report);
+        self.note_alert(id, &report);
         if let Report::Refused { reason } = &report
             && !std::mem::take(&mut self.spoilt)
         {
@@ -835,6 +838,7 @@ impl Swarm {
                 .on_way_home(self.now_ms, &peers, self.judged.covered());
             return;
         }
+        self.judge_crowd();
         let loss_permille = self.air.loss_permille();
         self.checker.on_snapshot(
             self.now_ms,

@@ -7,6 +7,7 @@
 mod board;
 pub mod camera;
 pub mod contour;
+pub mod crowd;
 pub(crate) mod detector;
 pub mod fact;
 pub mod fixture;
@@ -32,6 +33,7 @@ pub use survey::{Cell, Survey, Uncoverable};
 use crate::spec::Spec;
 use crate::weather::Weather;
 use contour::Contour;
+use crowd::Crowd;
 use motion::{Kinematic, Piece};
 use skein_behaviors::traffic::{Sighting as Seen, Traffic};
 use skein_behaviors::{Percept, Setpoint};
@@ -153,6 +155,7 @@ pub struct World {
     vehicles: Vehicles,
     weather: Weather,
     contour: Option<Contour>,
+    crowd: Option<Crowd>,
     facts: Vec<Fact>,
     flown: Vec<Piece>,
     airborne: Vec<(u16, Place)>,
@@ -229,6 +232,10 @@ impl World {
             vehicles: Vehicles::new(&spec.vehicles, seed),
             weather: spec.wind.clone(),
             contour: spec.contour.as_ref().map(|c| Contour::new(c, seed)),
+            crowd: spec
+                .crowd
+                .as_ref()
+                .map(|c| Crowd::new(c, spec.percept_period_ms, seed)),
             facts: Vec::new(),
             flown: Vec::new(),
             airborne: Vec::new(),
@@ -406,6 +413,9 @@ impl World {
             contour: self.contour.as_ref().map_or_else(Default::default, |c| {
                 c.look(body, uav, self.now_ms, &self.site.obstacles)
             }),
+            crowd: self.crowd.as_ref().map_or_else(Default::default, |c| {
+                c.look(body, uav, self.now_ms, &self.site.obstacles)
+            }),
             attitude,
             ..own
         })
@@ -425,6 +435,20 @@ impl World {
         both.map_or_else(Vec::new, |(c, body)| {
             c.pictured(body, self.now_ms, &self.site.obstacles)
         })
+    }
+
+    /// The people of a mass event, as they are.
+    #[must_use]
+    pub fn crowd(&self) -> Option<&Crowd> {
+        self.crowd.as_ref()
+    }
+
+    /// Whether nothing stands between a place on the ground and the camera of a UAV.
+    #[must_use]
+    pub fn is_open_to(&self, uav: u16, at: skein_geometry::frame::Point) -> bool {
+        let place = Place { at, height_m: 1.0 };
+        let body = self.body(uav);
+        body.is_some_and(|b| self.site.obstacles.sees(place_of(b), place))
     }
 
     /// The vehicles on the ground, as they are.
@@ -527,6 +551,9 @@ impl World {
                     u.body.take_wind(wind);
                 }
             }
+        }
+        if let Some(crowd) = &mut self.crowd {
+            crowd.advance(self.now_ms);
         }
     }
 

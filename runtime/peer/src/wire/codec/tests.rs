@@ -1,6 +1,7 @@
 //! Bytes of all kinds: typical, largest, refused, cut short, changed.
 
 use super::super::count::Count;
+use super::super::crowd::{CrowdTile, Sure};
 use super::super::detection::Detection;
 use super::super::limits::*;
 use super::super::samples::{fresh, golden, gossip, largest, listing};
@@ -457,6 +458,27 @@ fn every_limit_is_sharp() {
                     with(&|u| u.turns.push(TurnUse::default()), "turns");
                 }
             }
+            Body::Crowd(t) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut CrowdTile), field| {
+                    let mut t = t.clone();
+                    change(&mut t);
+                    refused(&Body::Crowd(t), field);
+                };
+                with(&|t| t.rows.push(t.rows[15]), "rows");
+                with(&|t| t.time_ms += 1, "time_ms");
+                with(&|t| t.time_ms = 5, "age_ms");
+                with(&|t| t.rows[15].sector += 1, "sector");
+                with(&|t| t.rows[1].sector = 0, "rows");
+                with(&|t| t.rows[1].people -= 1, "low");
+                with(&|t| t.rows[1].high -= 1, "high");
+                with(&|t| t.rows[1].age_ms += 1, "age_ms");
+                with(&|t| t.rows[1].came -= 1, "came");
+                with(&|t| t.rows[1].sure = Sure::None, "sure_age_ms");
+                with(&|t| t.rows[1].sure_age_ms += 1, "sure_age_ms");
+                with(&|t| t.rows[1].dense_ms += 1, "dense_ms");
+                with(&|t| t.rows[1].sure = Sure::Eased, "dense_ms");
+            }
             Body::Count(c) => {
                 kinds += 1;
                 let with = |change: &dyn Fn(&mut Count), field| {
@@ -484,7 +506,7 @@ fn every_limit_is_sharp() {
             Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 19);
+    assert_eq!(kinds, 20);
 }
 
 #[test]

@@ -1,0 +1,414 @@
+//! The people of a mass event as one peer knows of them (D2.7 §3.1): what it sees in its own
+//! pictures, and what others tell of theirs.
+//!
+//! | event | what follows |
+//! |---|---|
+//! | a look, and all of a sector is in it for certain | how many people it holds, with a range; the look before is out of date |
+//! | by that look it is certainly too dense, or has certainly eased | so it is from then on; what is neither is what it was |
+//! | a sector became too dense, or eased, in the own pictures | told at once |
+//! | its looks are newer than those that anybody told by the mission's interval, or differ from them for certain | told a few seconds later, with all of the tile |
+//! | a tile of another, or the own one as it is told | of each sector the newest look is kept, and the newest one that was sure |
+//! | a sector is too dense by that, and was not, or the other way round | told to people here |
+//! | another life begins, another event or another sortie | its own looks begin at nothing |
+//!
+//! A sector is counted in one picture, so whoever walks from one into the next is in one of them.
+//! That a later look goes before is a join: whoever heard the same knows the same, in whatever
+//! order it came.
+//!
+//! # Guarantees
+//! Bounded: 1,024 sectors, and as many of another event until it is known which one counts. Nothing
+//! is drawn. Without an event nothing is kept and nothing said.
+
+use crate::Incarnation;
+use crate::crowd::CrowdWatch;
+use crate::effect::{Effect, Effects};
+use crate::input::Time;
+use crate::mission::Mission;
+use crate::output::Report;
+use crate::wire::codec::Body;
+use crate::wire::crowd::{CAME_MAX, CrowdRow, CrowdTile, SECTORS_EACH, SECTORS_MAX, Sure};
+use crate::wire::limits::DURATION_MAX_MS;
+use skein_behaviors::Percept;
+use skein_behaviors::view::View;
+use skein_flight::airframe::Airframe;
+use skein_flight::mount::DIRECTION_OFF_RAD;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+mod estimate;
+mod known;
+use estimate::{Picture, estimate};
+pub use known::{Crowd, CrowdAlert, Look, People, Sector, Verdict};
+
+/// Most sectors that are kept.
+pub const KNOWN_MAX: usize = 2 * SECTORS_MAX as usize;
+
+/// Looks that are farther apart than this are none of one pass, milliseconds.
+const PASS_MS: u64 = 10_000;
+
+/// What is told of a pass waits for so long, so that all of the tile is told together,
+/// milliseconds.
+const GATHERED_MS: u64 = 4_000;
+
+/// At the end everything is told that is so much newer than what is known, milliseconds.
+const LAST_MS: u64 = 1_000;
+
+/// A sector as its own UAV saw it in this life.
+#[derive(Clone, Copy, Debug, Default)]
+struct Own {
+    sector: Sector,
+    /// The newest look of the pass before, by anybody.
+    before: Option<Look>,
+}
+
+/// The event of the mission that is followed.
+#[derive(Clone, Debug)]
+struct Followed {
+    of: u32,
+    watch: Arc<CrowdWatch>,
+}
+
+/// All that one peer knows of the people of an event.
+#[derive(Debug, Default)]
+pub(crate) struct Gathering {
+    me: u16,
+    life: Incarnation,
+    followed: Option<Followed>,
+    own: BTreeMap<u16, Own>,
+    /// What anybody told, this peer too; by event and sector.
+    known: BTreeMap<(u32, u16), Sector>,
+    /// When each own tile was told last.
+    told: BTreeMap<u16, Time>,
+    /// Since when each own tile has news.
+    news: BTreeMap<u16, Time>,
+    said_at: Time,
+    last_ms: u64,
+}
+
+/// What of a tile is to be told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum News {
+    None,
+    Some,
+    Urgent,
+}
+
+impl Gathering {
+    /// Nothing is known.
+    pub fn new(me: u16) -> Self {
+        Self {
+            me,
+            ..Self::default()
+        }
+    }
+
+    /// A life begins.
+    pub fn begin_life(&mut self, life: Incarnation) {
+        self.life = life;
+        self.clear_own();
+    }
+
+    fn clear_own(&mut self) {
+        self.own.clear();
+        self.told.clear();
+        self.news.clear();
+    }
+
+    /// The event of the mission.
+    pub fn follow(&mut self, mission: &Mission) {
+        let Some(watch) = &mission.crowd else {
+            if self.followed.take().is_some() {
+                self.clear_own();
+            }
+            return;
+        };
+        // A later lap shares the event of the one before.
+        if matches!(&self.followed, Some(f) if Arc::ptr_eq(&f.watch, watch)) {
+            return;
+        }
+        let of = mission.crowd_hash();
+        if self.followed.as_ref().is_none_or(|f| f.of != of) {
+            self.clear_own();
+        }
+        self.followed = Some(Followed {
+            of,
+            watch: Arc::clone(watch),
+        });
+    }
+
+    /// What is known of a sector, told or not: by whom it was seen last decides.
+    fn newest(&self, of: u32, sector: u16) -> Sector {
+        let known = self.known.get(&(of, sector)).copied().unwrap_or_default();
+        let own = self.own.get(&sector).map(|o| o.sector).unwrap_or_default();
+        known.joined(own)
+    }
+
+    /// One look of the own camera; `looks` where this peer is to look at all.
+    pub fn look(&mut self, percept: &Percept, airframe: &Airframe, looks: bool) {
+        let Some(Followed { of, watch }) = self.followed.clone() else {
+            return;
+        };
+        if !looks || percept.crowd.is_absent() || percept.takes_off_in_ms > 0 {
+            return;
+        }
+        let now_ms = percept.time_ms;
+        self.last_ms = now_ms;
+        let view = View::of(percept, airframe);
+        let certain_rad = if airframe.mount.is_level() {
+            0.0
+        } else {
+            DIRECTION_OFF_RAD
+        };
+        let squares = percept.crowd.seen().iter();
+        let certain = squares.filter(|s| view.holds(&s.corners(), 0.0, certain_rad));
+        let picture = Picture::new(certain);
+        let Some((low, high)) = picture.bounds() else {
+            return;
+        };
+        for sector in watch.within(low, high) {
+            let Some(held) = watch.squares(sector).and_then(|s| picture.held(s)) else {
+                continue;
+            };
+            let seen = estimate(&held);
+            self.take(&watch, of, (sector, now_ms), seen);
+        }
+    }
+
+    /// A sector was counted: so many people, at least and at most.
+    fn take(
+        &mut self,
+        watch: &CrowdWatch,
+        of: u32,
+        (sector, now_ms): (u16, u64),
+        (people, low, high): (u16, u16, u16),
+    ) {
+        let newest = self.newest(of, sector);
+        let own = self.own.entry(sector).or_default();
+        if let Some(last) = newest.look
+            && last.seen_ms + PASS_MS <= now_ms
+        {
+            own.before = Some(last);
+        }
+        let came = own.before.map_or(0, |b| certainly_came((low, high), &b));
+        let look = Look {
+            seen_ms: now_ms,
+            by: self.me,
+            people,
+            low,
+            high,
+            came,
+        };
+        let dense = f64::from(low) > watch.dense_people();
+        let eased = f64::from(high) < watch.eased_people();
+        let goes_on = newest.verdict.and_then(|v| v.dense);
+        let verdict = (dense || eased).then(|| Verdict {
+            at_ms: now_ms,
+            by: self.me,
+            dense: dense.then(|| goes_on.unwrap_or((now_ms, self.me))),
+        });
+        own.sector.look = own.sector.look.max(Some(look));
+        own.sector.verdict = own.sector.verdict.max(verdict);
+    }
+
+    /// What of an own tile is news beside what anybody told.
+    fn news_of(&self, tile: u16, (of, interval_ms): (u32, u64)) -> News {
+        let first = SECTORS_EACH * tile;
+        let own = self.own.range(first..first + SECTORS_EACH);
+        let news = own.map(|(sector, own)| {
+            let known = self.known.get(&(of, *sector)).copied().unwrap_or_default();
+            let (Some(look), sector) = (own.sector.look, own.sector) else {
+                return News::None;
+            };
+            let is_dense = |s: &Sector| s.dense().is_some();
+            let is_sure = sector.verdict > known.verdict;
+            if is_sure && is_dense(&sector) != is_dense(&known) {
+                return News::Urgent;
+            }
+            let is_news = known.look.is_none_or(|told| {
+                let later_ms = look.seen_ms.saturating_sub(told.seen_ms);
+                let differs = look.low > told.high || look.high < told.low;
+                later_ms >= interval_ms || differs && later_ms >= interval_ms / 2
+            });
+            if is_news { News::Some } else { News::None }
+        });
+        news.max().unwrap_or(News::None)
+    }
+
+    /// What is to be told now: one tile at a time, where a sector became too dense or eased first.
+    pub fn tell(&mut self, now: Time, beacon_ms: u64, looks: bool) -> Effects {
+        let Some(Followed { of, watch }) = self.followed.clone() else {
+            return Effects::new();
+        };
+        if self.own.is_empty() || now.since_ms(self.said_at) < beacon_ms {
+            return Effects::new();
+        }
+        let interval_ms = if looks {
+            1_000 * u64::from(watch.interval_s)
+        } else {
+            LAST_MS
+        };
+        let tiles: BTreeSet<u16> = self.own.keys().map(|s| s / SECTORS_EACH).collect();
+        let mut due: Option<(News, u64, u16)> = None;
+        for tile in tiles {
+            let news = self.news_of(tile, (of, interval_ms));
+            if news == News::None {
+                self.news.remove(&tile);
+                continue;
+            }
+            let since_ms = now.since_ms(*self.news.entry(tile).or_insert(now));
+            let told_ms = self.told.get(&tile).map_or(u64::MAX, |t| now.since_ms(*t));
+            let is_due = news == News::Urgent
+                || !looks
+                || since_ms >= GATHERED_MS && told_ms >= interval_ms / 2;
+            if is_due && due.is_none_or(|d| (news, since_ms) > (d.0, d.1)) {
+                due = Some((news, since_ms, tile));
+            }
+        }
+        let Some((.., tile)) = due else {
+            return Effects::new();
+        };
+        self.news.remove(&tile);
+        self.told.insert(tile, now);
+        self.said_at = now;
+        let told = self.register(tile, of);
+        let mut effects = self.learn((self.me, tile), &told);
+        effects.push(Effect::Speak(tile, Body::Crowd(told)));
+        effects
+    }
+
+    /// An own tile as it is now: what somebody saw later is left out.
+    fn register(&self, tile: u16, of: u32) -> CrowdTile {
+        let first = SECTORS_EACH * tile;
+        let own = self.own.range(first..first + SECTORS_EACH);
+        let rows = own.filter_map(|(sector, own)| {
+            let known = self.known.get(&(of, *sector)).copied().unwrap_or_default();
+            let look = own.sector.look?;
+            // What nobody says later stands in some register for good, so whoever comes gets it.
+            let is_sure = own.sector.verdict.is_some() && own.sector.verdict >= known.verdict;
+            let is_of_use = Some(look) >= known.look || is_sure;
+            is_of_use.then_some((*sector, look, own.sector.verdict))
+        });
+        let rows: Vec<(u16, Look, Option<Verdict>)> = rows.collect();
+        let time_ms = rows.iter().map(|(_, l, _)| l.seen_ms).max().unwrap_or(0);
+        let row = |(sector, look, verdict): &(u16, Look, Option<Verdict>)| {
+            row_of(*sector, look, verdict.as_ref(), time_ms)
+        };
+        CrowdTile {
+            crowd: of,
+            time_ms,
+            rows: rows.iter().filter_map(row).collect(),
+        }
+    }
+
+    /// What another tells.
+    pub fn hear(&mut self, author: u16, tile: u16, told: &CrowdTile) -> Effects {
+        self.learn((author, tile), told)
+    }
+
+    fn learn(&mut self, (author, tile): (u16, u16), told: &CrowdTile) -> Effects {
+        let of = self.followed.as_ref().map(|f| f.of);
+        let mut effects = Effects::new();
+        for row in &told.rows {
+            let sector = SECTORS_EACH * tile + u16::from(row.sector);
+            let key = (told.crowd, sector);
+            if self.known.len() >= KNOWN_MAX && !self.known.contains_key(&key) {
+                self.known.retain(|(event, _), _| Some(*event) == of);
+                if self.known.len() >= KNOWN_MAX {
+                    return effects;
+                }
+            }
+            let held = self.known.entry(key).or_default();
+            let before = *held;
+            *held = before.joined(Sector::of(row, told.time_ms, author));
+            let now = *held;
+            let is_followed = self.followed.as_ref().filter(|f| f.of == told.crowd);
+            if let Some(f) = is_followed
+                && before.dense().is_some() != now.dense().is_some()
+                && let Some(told) = now.alert(&f.watch, sector)
+            {
+                effects.push(Effect::Report(Report::Crowd { told }));
+            }
+        }
+        effects
+    }
+
+    /// What all together saw, as far as is known here; none without an event.
+    pub fn crowd(&self, mission: &Mission) -> Option<Crowd> {
+        let watch = mission.crowd.as_ref()?;
+        let of = mission.crowd_hash();
+        let known = self.known.range((of, 0)..=(of, u16::MAX));
+        let known = known.map(|((_, sector), s)| (*sector, *s)).collect();
+        Some(Crowd::new(Arc::clone(watch), known))
+    }
+
+    /// What this UAV saw itself in this life, told or not, by sector.
+    pub fn own(&self) -> impl Iterator<Item = (u16, Sector)> {
+        self.own.iter().map(|(n, own)| (*n, own.sector))
+    }
+
+    /// The sectors of the event that is followed, as they were told.
+    pub fn followed(&self) -> impl Iterator<Item = (u16, Sector)> {
+        let of = self.followed.as_ref().map(|f| f.of);
+        let of = of.map(|of| self.known.range((of, 0)..=(of, u16::MAX)));
+        let all = of.into_iter().flatten();
+        all.map(|((_, n), s)| (*n, *s))
+    }
+
+    /// Those that are too dense.
+    pub fn dense(&self) -> impl Iterator<Item = (u16, Sector)> {
+        self.followed().filter(|(_, s)| s.dense().is_some())
+    }
+
+    /// When its camera looked last, milliseconds of the clock of percepts.
+    pub fn last_ms(&self) -> u64 {
+        self.last_ms
+    }
+
+    /// How many sectors are kept.
+    pub fn len(&self) -> usize {
+        self.known.len()
+    }
+}
+
+/// How many more people there certainly are than in the look before; fewer below 0.
+fn certainly_came((low, high): (u16, u16), before: &Look) -> i32 {
+    let of = |n: u16| i32::from(n);
+    let more = of(low) - of(before.high);
+    let fewer = of(high) - of(before.low);
+    if more > 0 {
+        more.min(CAME_MAX)
+    } else {
+        fewer.min(0)
+    }
+}
+
+/// A sector as it is told; none where it was seen longer ago than can be said.
+fn row_of(sector: u16, look: &Look, verdict: Option<&Verdict>, time_ms: u64) -> Option<CrowdRow> {
+    let before = |ms: u64, of_ms: u64| {
+        let ago_ms = u32::try_from(of_ms.saturating_sub(ms)).ok()?;
+        (ago_ms <= DURATION_MAX_MS).then_some(ago_ms)
+    };
+    let mut row = CrowdRow {
+        sector: u8::try_from(sector % SECTORS_EACH).ok()?,
+        people: look.people,
+        low: look.low,
+        high: look.high,
+        age_ms: before(look.seen_ms, time_ms)?,
+        came: look.came,
+        ..CrowdRow::default()
+    };
+    let Some(v) = verdict else {
+        return Some(row);
+    };
+    row.sure_age_ms = before(v.at_ms, time_ms)?;
+    row.sure = Sure::Eased;
+    if let Some((since_ms, by)) = v.dense {
+        row.sure = Sure::Dense;
+        row.dense_ms = before(since_ms, v.at_ms)?;
+        row.by = by;
+    }
+    Some(row)
+}
+
+#[cfg(test)]
+mod tests;
