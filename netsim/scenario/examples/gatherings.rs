@@ -97,6 +97,7 @@ impl Teller for Totals {
             let bytes = simulated.bytes_by_kind.get("crowd").copied().unwrap_or(0);
             #[allow(clippy::cast_precision_loss, reason = "far below 2^52")]
             self.kbps.push(bytes as f64 * 8.0 / r.end_ms.max(1) as f64);
+            println!("  bytes by kind: {:?}", simulated.bytes_by_kind);
         }
         for told in r.crowd.iter() {
             told.lines().iter().for_each(|line| println!("  {line}"));

@@ -26,8 +26,9 @@ use crate::input::Time;
 use crate::mission::Mission;
 use crate::output::Report;
 use crate::wire::codec::Body;
-use crate::wire::crowd::{CAME_MAX, CrowdRow, CrowdTile, SECTORS_EACH, SECTORS_MAX, Sure};
-use crate::wire::limits::DURATION_MAX_MS;
+use crate::wire::crowd::{
+    AGO_MAX_S, CAME_MAX, CrowdDense, CrowdRow, CrowdTile, SECTORS_EACH, SECTORS_MAX, Sure,
+};
 use skein_behaviors::Percept;
 use skein_behaviors::view::View;
 use skein_flight::airframe::Airframe;
@@ -50,8 +51,20 @@ const PASS_MS: u64 = 10_000;
 /// milliseconds.
 const GATHERED_MS: u64 = 4_000;
 
+/// All together tell one tile in so many beacon intervals, what is urgent apart: that and its
+/// copies take a tenth of the air of 64 kbit/s.
+const TURN_INTERVALS: u64 = 2;
+
 /// At the end everything is told that is so much newer than what is known, milliseconds.
 const LAST_MS: u64 = 1_000;
+
+/// Where nobody is for certain, and nobody was, that is told so many times less often.
+const EMPTY: u64 = 4;
+
+/// Looks so far apart are as good as one, milliseconds: of those the narrower range is kept, unless
+/// the later one is nearly as narrow.
+const AT_ONCE_MS: u64 = 5_000;
+const NARROWER: u32 = 2;
 
 /// A sector as its own UAV saw it in this life.
 #[derive(Clone, Copy, Debug, Default)]
@@ -151,7 +164,8 @@ impl Gathering {
         if !looks || percept.crowd.is_absent() || percept.takes_off_in_ms > 0 {
             return;
         }
-        let now_ms = percept.time_ms;
+        // Times are told in whole seconds.
+        let now_ms = percept.time_ms / 1_000 * 1_000;
         self.last_ms = now_ms;
         let view = View::of(percept, airframe);
         let certain_rad = if airframe.mount.is_level() {
@@ -206,6 +220,14 @@ impl Gathering {
             by: self.me,
             dense: dense.then(|| goes_on.unwrap_or((now_ms, self.me))),
         });
+        let is_better = own.sector.look.is_none_or(|held| {
+            let width = |l: &Look| u32::from(l.high - l.low);
+            let is_late = look.seen_ms >= held.seen_ms + AT_ONCE_MS;
+            is_late || NARROWER * width(&look) <= (NARROWER + 1) * width(&held).max(4)
+        });
+        if !is_better {
+            return;
+        }
         own.sector.look = own.sector.look.max(Some(look));
         own.sector.verdict = own.sector.verdict.max(verdict);
     }
@@ -227,6 +249,12 @@ impl Gathering {
             let is_news = known.look.is_none_or(|told| {
                 let later_ms = look.seen_ms.saturating_sub(told.seen_ms);
                 let differs = look.low > told.high || look.high < told.low;
+                let is_empty = look.low == 0 && told.low == 0;
+                let interval_ms = if is_empty {
+                    EMPTY * interval_ms
+                } else {
+                    interval_ms
+                };
                 later_ms >= interval_ms || differs && later_ms >= interval_ms / 2
             });
             if is_news { News::Some } else { News::None }
@@ -235,7 +263,8 @@ impl Gathering {
     }
 
     /// What is to be told now: one tile at a time, where a sector became too dense or eased first.
-    pub fn tell(&mut self, now: Time, beacon_ms: u64, looks: bool) -> Effects {
+    /// So many UAVs share the air.
+    pub fn tell(&mut self, now: Time, (beacon_ms, uavs): (u64, u64), looks: bool) -> Effects {
         let Some(Followed { of, watch }) = self.followed.clone() else {
             return Effects::new();
         };
@@ -257,9 +286,9 @@ impl Gathering {
             }
             let since_ms = now.since_ms(*self.news.entry(tile).or_insert(now));
             let told_ms = self.told.get(&tile).map_or(u64::MAX, |t| now.since_ms(*t));
-            let is_due = news == News::Urgent
-                || !looks
-                || since_ms >= GATHERED_MS && told_ms >= interval_ms / 2;
+            let is_gathered = since_ms >= GATHERED_MS && told_ms >= interval_ms / 2;
+            let is_turn = now.since_ms(self.said_at) >= TURN_INTERVALS * beacon_ms * uavs;
+            let is_due = news == News::Urgent || (is_gathered || !looks) && is_turn;
             if is_due && due.is_none_or(|d| (news, since_ms) > (d.0, d.1)) {
                 due = Some((news, since_ms, tile));
             }
@@ -290,14 +319,18 @@ impl Gathering {
         });
         let rows: Vec<(u16, Look, Option<Verdict>)> = rows.collect();
         let time_ms = rows.iter().map(|(_, l, _)| l.seen_ms).max().unwrap_or(0);
-        let row = |(sector, look, verdict): &(u16, Look, Option<Verdict>)| {
-            row_of(*sector, look, verdict.as_ref(), time_ms)
-        };
-        CrowdTile {
+        let mut tile = CrowdTile {
             crowd: of,
-            time_ms,
-            rows: rows.iter().filter_map(row).collect(),
+            time_s: time_ms / 1_000,
+            ..CrowdTile::default()
+        };
+        for (sector, look, verdict) in rows {
+            if let Some((row, dense)) = row_of((sector, time_ms), &look, verdict.as_ref()) {
+                tile.rows.push(row);
+                tile.dense.extend(dense);
+            }
         }
+        tile
     }
 
     /// What another tells.
@@ -319,7 +352,8 @@ impl Gathering {
             }
             let held = self.known.entry(key).or_default();
             let before = *held;
-            *held = before.joined(Sector::of(row, told.time_ms, author));
+            let dense = told.dense.iter().find(|d| d.sector == row.sector);
+            *held = before.joined(Sector::of((row, dense), told.time_s, author));
             let now = *held;
             let is_followed = self.followed.as_ref().filter(|f| f.of == told.crowd);
             if let Some(f) = is_followed
@@ -354,6 +388,12 @@ impl Gathering {
         all.map(|((_, n), s)| (*n, *s))
     }
 
+    /// When a sector of the event that is followed was seen last, told or not.
+    pub fn seen_last(&self, sector: u16) -> Option<Look> {
+        let of = self.followed.as_ref()?.of;
+        self.newest(of, sector).look
+    }
+
     /// Those that are too dense.
     pub fn dense(&self) -> impl Iterator<Item = (u16, Sector)> {
         self.followed().filter(|(_, s)| s.dense().is_some())
@@ -383,31 +423,40 @@ fn certainly_came((low, high): (u16, u16), before: &Look) -> i32 {
 }
 
 /// A sector as it is told; none where it was seen longer ago than can be said.
-fn row_of(sector: u16, look: &Look, verdict: Option<&Verdict>, time_ms: u64) -> Option<CrowdRow> {
+fn row_of(
+    (sector, time_ms): (u16, u64),
+    look: &Look,
+    verdict: Option<&Verdict>,
+) -> Option<(CrowdRow, Option<CrowdDense>)> {
     let before = |ms: u64, of_ms: u64| {
-        let ago_ms = u32::try_from(of_ms.saturating_sub(ms)).ok()?;
-        (ago_ms <= DURATION_MAX_MS).then_some(ago_ms)
+        let ago_s = u32::try_from(of_ms.saturating_sub(ms) / 1_000).ok()?;
+        (ago_s <= AGO_MAX_S).then_some(ago_s)
     };
+    let sector = u8::try_from(sector % SECTORS_EACH).ok()?;
     let mut row = CrowdRow {
-        sector: u8::try_from(sector % SECTORS_EACH).ok()?,
+        sector,
         people: look.people,
         low: look.low,
         high: look.high,
-        age_ms: before(look.seen_ms, time_ms)?,
+        age_s: before(look.seen_ms, time_ms)?,
         came: look.came,
         ..CrowdRow::default()
     };
     let Some(v) = verdict else {
-        return Some(row);
+        return Some((row, None));
     };
-    row.sure_age_ms = before(v.at_ms, time_ms)?;
+    row.sure_before_s = before(v.at_ms, look.seen_ms)?;
     row.sure = Sure::Eased;
-    if let Some((since_ms, by)) = v.dense {
-        row.sure = Sure::Dense;
-        row.dense_ms = before(since_ms, v.at_ms)?;
-        row.by = by;
-    }
-    Some(row)
+    let Some((since_ms, by)) = v.dense else {
+        return Some((row, None));
+    };
+    row.sure = Sure::Dense;
+    let dense = CrowdDense {
+        sector,
+        dense_s: before(since_ms, v.at_ms)?,
+        by,
+    };
+    Some((row, Some(dense)))
 }
 
 #[cfg(test)]

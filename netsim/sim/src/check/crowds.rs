@@ -49,6 +49,9 @@ const WELL: f64 = 0.8;
 /// Who may look is asked once a period: so many looks that nothing came of prove it.
 const LOOKS: u64 = 3;
 
+/// Of looks at one time a UAV may keep an earlier one that tells more exactly, milliseconds.
+const KEPT_MS: u64 = 6_000;
+
 /// Who knows that a sector became too dense tells so within so many of its intervals: one tile at
 /// a time, four of them in a picture, when what was said before has gone out.
 const TOLD_INTERVALS: u64 = 12;
@@ -168,14 +171,15 @@ impl CrowdCheck {
             return;
         }
         let watcher = self.watchers.entry(look.uav).or_default();
-        let fresh = |s: &Sector| s.look.is_some_and(|l| l.seen_ms == now_ms);
+        let second_ms = now_ms / 1_000 * 1_000;
+        let since = |s: &Sector, ms: u64| s.look.is_some_and(|l| l.seen_ms + ms >= second_ms);
         let own: BTreeMap<u16, Sector> = look.own.iter().copied().collect();
         for sector in watch.sectors() {
             let Some(low) = watch.low(sector) else {
                 continue;
             };
             let corners = truth::corners(low, side_m);
-            let seen = own.get(&sector).filter(|s| fresh(s));
+            let seen = own.get(&sector).filter(|s| since(s, 0));
             let in_picture = |share: f64| corners.iter().all(|p| look.picture.shows(*p, share));
             // Both reckon with the same numbers, and not in the same order.
             if seen.is_some()
@@ -197,7 +201,8 @@ impl CrowdCheck {
                 continue;
             }
             let missed = watcher.missed.entry(sector).or_default();
-            *missed = if seen.is_some() { 0 } else { *missed + 1 };
+            let is_seen = own.get(&sector).is_some_and(|s| since(s, KEPT_MS));
+            *missed = if is_seen { 0 } else { *missed + 1 };
             if *missed == LOOKS {
                 found.broken("crowd-idle", now_ms, Some(look.uav.0), || {
                     format!("has sector {sector} in its picture, and counts nobody there")

@@ -797,6 +797,7 @@ impl Swarm {
         self.meter.enter(before);
         self.account.reported(self.now_ms, id, &meant);
         self.note_voice(id, &report);
+        self.note_look_asked(id, peer, &report);
         self.note_task(id, &report);
         self.note_detection(id, &report);
         self.note_alert(id, &report);
@@ -1054,7 +1055,7 @@ impl Swarm {
         if self
             .air
             .judge()
-            .saw_task((task.number, *revision))
+            .saw_task(self.judged_as(*task, *revision))
             .is_none()
         {
             let text = format!("says that it saw the task {name:?}, and did not");

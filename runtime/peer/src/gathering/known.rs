@@ -4,7 +4,7 @@
 use crate::crowd::CrowdWatch;
 use crate::mission::mm;
 use crate::targets::PLACE_M;
-use crate::wire::crowd::{CrowdRow, Sure};
+use crate::wire::crowd::{CrowdDense, CrowdRow, Sure};
 use serde::{Deserialize, Serialize};
 use skein_behaviors::crowd::RECOGNISED;
 use skein_geometry::math::seconds;
@@ -53,18 +53,21 @@ pub struct Sector {
 
 impl Sector {
     /// As an author tells of it.
-    pub(super) fn of(row: &CrowdRow, time_ms: u64, author: u16) -> Self {
-        let before = |ms: u32| time_ms.saturating_sub(u64::from(ms));
+    pub(super) fn of(
+        (row, dense): (&CrowdRow, Option<&CrowdDense>),
+        time_s: u64,
+        author: u16,
+    ) -> Self {
+        let before = |of_ms: u64, s: u32| of_ms.saturating_sub(1_000 * u64::from(s));
         let look = Look {
-            seen_ms: before(row.age_ms),
+            seen_ms: before(1_000 * time_s, row.age_s),
             by: author,
             people: row.people,
             low: row.low,
             high: row.high,
             came: row.came,
         };
-        let at_ms = before(row.sure_age_ms);
-        let since_ms = at_ms.saturating_sub(u64::from(row.dense_ms));
+        let at_ms = before(look.seen_ms, row.sure_before_s);
         let verdict = |dense| Verdict {
             at_ms,
             by: author,
@@ -72,10 +75,10 @@ impl Sector {
         };
         Self {
             look: Some(look),
-            verdict: match row.sure {
-                Sure::None => None,
-                Sure::Eased => Some(verdict(None)),
-                Sure::Dense => Some(verdict(Some((since_ms, row.by)))),
+            verdict: match (row.sure, dense) {
+                (Sure::None, _) => None,
+                (Sure::Dense, Some(d)) => Some(verdict(Some((before(at_ms, d.dense_s), d.by)))),
+                _ => Some(verdict(None)),
             },
         }
     }

@@ -50,7 +50,10 @@ impl Tasking {
         }
         let looks = !mission.cancelled && !state.stage.ended();
         let interval_ms = s.membership.interval_ms();
-        let mut effects = self.gathering.tell(s.now, interval_ms, looks);
+        let uav = |id: u16| s.membership.info(id).is_some_and(|i| !i.ground_station);
+        let others = s.membership.live().filter(|(id, _)| uav(*id)).count();
+        let uavs = 1 + u64::try_from(others).unwrap_or(0);
+        let mut effects = self.gathering.tell(s.now, (interval_ms, uavs), looks);
         effects.extend(self.leave_eased(s, looks));
         if let Some(watch) = mission.crowd.as_ref().filter(|_| looks) {
             effects.extend(self.ask_for_looks(s, &mission, watch));
@@ -86,10 +89,9 @@ impl Tasking {
         }
         let every_ms = 1_000 * u64::from(watch.look_every_s);
         let now_ms = self.gathering.last_ms();
-        let is_due = |(_, sector): &(u16, Sector)| {
-            sector
-                .look
-                .is_some_and(|look| look.by == self.me && look.seen_ms + every_ms <= now_ms)
+        let is_due = |(sector, _): &(u16, Sector)| {
+            let last = self.gathering.seen_last(*sector);
+            last.is_some_and(|look| look.by == self.me && look.seen_ms + every_ms <= now_ms)
         };
         let due: Vec<(u16, Sector)> = self.gathering.dense().filter(is_due).collect();
         for (sector, _) in due {

@@ -10,7 +10,7 @@ use super::cbor::{Listed, array_of, number_of};
 use super::codec::WireError;
 use super::limits::{DURATION_MAX_MS, at_most, in_range};
 use super::schema::{Place, Shape, U16, U32, at};
-use super::target::{TIME_MAX_MS, TIME_MS};
+use super::target::TIME_MAX_MS;
 use serde::{Deserialize, Serialize};
 
 /// Sectors of a tile: four by four.
@@ -53,17 +53,26 @@ pub struct CrowdRow {
     pub low: u16,
     /// And at most, in nineteen cases of twenty.
     pub high: u16,
-    /// How long before the time of the register it was looked at, milliseconds.
-    pub age_ms: u32,
+    /// How long before the time of the register it was looked at, seconds.
+    pub age_s: u32,
     /// How many more there certainly were than in the look before; fewer below 0.
     pub came: i32,
     /// What the newest sure look said.
     pub sure: Sure,
-    /// How long before the time of the register that was, milliseconds; 0 where there was none.
-    pub sure_age_ms: u32,
-    /// Of one that is too dense for how long it had been by then, milliseconds; else 0.
-    pub dense_ms: u32,
-    /// And who saw that first; else 0.
+    /// How long before this look that was, seconds; 0 where there was none.
+    pub sure_before_s: u32,
+}
+
+/// Of a sector that is too dense since when, and who saw that first.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+pub struct CrowdDense {
+    /// Which sector of the tile.
+    pub sector: u8,
+    /// For how long it had been so in the newest sure look, seconds.
+    pub dense_s: u32,
+    /// Who saw that first.
     pub by: u16,
 }
 
@@ -72,10 +81,12 @@ pub struct CrowdRow {
 pub struct CrowdTile {
     /// Of which event of which sortie: `Mission::crowd_hash`.
     pub crowd: u32,
-    /// The time of the register, milliseconds of the clock of percepts.
-    pub time_ms: u64,
+    /// The time of the register, seconds of the clock of percepts.
+    pub time_s: u64,
     /// Its sectors, ascending.
     pub rows: Vec<CrowdRow>,
+    /// Those that are too dense, ascending.
+    pub dense: Vec<CrowdDense>,
 }
 
 number_of!(Sure { None, Eased, Dense });
@@ -84,63 +95,83 @@ array_of!(CrowdRow {
     people,
     low,
     high,
-    age_ms,
+    age_s,
     came,
     sure,
-    sure_age_ms,
-    dense_ms,
+    sure_before_s
+});
+array_of!(CrowdDense {
+    sector,
+    dense_s,
     by
 });
 array_of!(CrowdTile {
     crowd,
-    time_ms,
-    rows
+    time_s,
+    rows,
+    dense
 });
 
 impl Listed for CrowdRow {
     const MAX: usize = SECTORS_EACH as usize;
 }
 
+impl Listed for CrowdDense {
+    const MAX: usize = SECTORS_EACH as usize;
+}
+
+/// The latest time, seconds of the clock of percepts.
+pub const TIME_MAX_S: u64 = TIME_MAX_MS / 1_000;
+
+/// The longest that something may be ago, seconds.
+pub const AGO_MAX_S: u32 = DURATION_MAX_MS / 1_000;
+
 /// The first field that is out of range.
 pub(super) fn check(t: &CrowdTile) -> Result<(), WireError> {
     at_most("rows", t.rows.len(), usize::from(SECTORS_EACH))?;
-    in_range("time_ms", t.time_ms <= TIME_MAX_MS)?;
+    at_most("dense", t.dense.len(), usize::from(SECTORS_EACH))?;
+    in_range("time_s", t.time_s <= TIME_MAX_S)?;
     let all = |holds: &dyn Fn(&CrowdRow) -> bool| t.rows.iter().all(holds);
     in_range("sector", all(&|r| u16::from(r.sector) < SECTORS_EACH))?;
     let ascends = t.rows.windows(2).all(|w| w[0].sector < w[1].sector);
     in_range("rows", ascends)?;
     in_range("low", all(&|r| r.low <= r.people))?;
     in_range("high", all(&|r| r.high >= r.people))?;
-    let is_before = |ms: u32| ms <= DURATION_MAX_MS && u64::from(ms) <= t.time_ms;
-    in_range("age_ms", all(&|r| is_before(r.age_ms)))?;
+    let is_before =
+        |s: u32, since_s: u32| s <= AGO_MAX_S && u64::from(s) + u64::from(since_s) <= t.time_s;
+    in_range("age_s", all(&|r| is_before(r.age_s, 0)))?;
     in_range("came", all(&|r| r.came.abs() <= CAME_MAX))?;
-    let sure =
-        |r: &CrowdRow| is_before(r.sure_age_ms) && (r.sure != Sure::None || r.sure_age_ms == 0);
-    in_range("sure_age_ms", all(&sure))?;
-    let dense = |r: &CrowdRow| {
-        let begun_ms = u64::from(r.dense_ms) + u64::from(r.sure_age_ms);
-        let is_so = r.sure == Sure::Dense;
-        r.dense_ms <= DURATION_MAX_MS && begun_ms <= t.time_ms && (is_so || r.dense_ms == 0)
+    let sure = |r: &CrowdRow| {
+        is_before(r.sure_before_s, r.age_s) && (r.sure != Sure::None || r.sure_before_s == 0)
     };
-    in_range("dense_ms", all(&dense))?;
-    in_range("by", all(&|r| r.sure == Sure::Dense || r.by == 0))
+    in_range("sure_before_s", all(&sure))?;
+    let dense = t.rows.iter().filter(|r| r.sure == Sure::Dense);
+    let is_of = |(r, d): (&CrowdRow, &CrowdDense)| r.sector == d.sector;
+    let are_those = dense.clone().count() == t.dense.len();
+    in_range("dense", are_those && dense.clone().zip(&t.dense).all(is_of))?;
+    let is_since = |(r, d): (&CrowdRow, &CrowdDense)| {
+        is_before(d.dense_s, r.age_s.saturating_add(r.sure_before_s))
+    };
+    in_range("dense_s", dense.zip(&t.dense).all(is_since))
 }
 
-const AGE: Shape = Shape::Number(0, DURATION_MAX_MS as i128);
+const AGO: Shape = Shape::Number(0, AGO_MAX_S as i128);
+
+const SECTOR: Place = at(
+    "sector",
+    "which sector of the tile",
+    Shape::Number(0, SECTORS_EACH as i128 - 1),
+);
 
 const ROW: &[Place] = &[
-    at(
-        "sector",
-        "which sector of the tile",
-        Shape::Number(0, SECTORS_EACH as i128 - 1),
-    ),
+    SECTOR,
     at("people", "how many people there were", U16),
     at("low", "at least", U16),
     at("high", "at most, in nineteen cases of twenty", U16),
     at(
-        "age_ms",
-        "how long before the time of the register it was looked at, ms",
-        AGE,
+        "age_s",
+        "how long before the time of the register it was looked at, s",
+        AGO,
     ),
     at(
         "came",
@@ -153,30 +184,39 @@ const ROW: &[Place] = &[
         Shape::Number(0, 2),
     ),
     at(
-        "sure_age_ms",
-        "how long before the time of the register that was, ms; 0 where there was none",
-        AGE,
+        "sure_before_s",
+        "how long before this look that was, s; 0 where there was none",
+        AGO,
     ),
+];
+
+const DENSE: &[Place] = &[
+    SECTOR,
     at(
-        "dense_ms",
-        "for how long it had been too dense by then, ms; 0 where it is not",
-        AGE,
+        "dense_s",
+        "for how long it had been too dense in the newest sure look, s",
+        AGO,
     ),
-    at("by", "who saw that first; 0 where it is not too dense", U16),
+    at("by", "who saw that first", U16),
 ];
 
 /// The places of a tile's body.
 pub(super) const CROWD: &[Place] = &[
     at("crowd", "of which event of which sortie: a hash", U32),
     at(
-        "time_ms",
-        "the time of the register, ms of the clock of percepts",
-        TIME_MS,
+        "time_s",
+        "the time of the register, s of the clock of percepts",
+        Shape::Number(0, TIME_MAX_S as i128),
     ),
     at(
         "rows",
         "its sectors, ascending",
         Shape::Rows(ROW, SECTORS_EACH as usize),
+    ),
+    at(
+        "dense",
+        "those that are too dense, ascending",
+        Shape::Rows(DENSE, SECTORS_EACH as usize),
     ),
 ];
 
@@ -189,29 +229,30 @@ pub(crate) mod samples {
     pub(crate) fn tile() -> CrowdTile {
         CrowdTile {
             crowd: 0x1234_5678,
-            time_ms: 81_400,
+            time_s: 81,
             rows: vec![
                 CrowdRow {
                     sector: 2,
                     people: 1_640,
                     low: 1_480,
                     high: 1_790,
-                    age_ms: 0,
                     came: 310,
                     sure: Sure::Dense,
-                    sure_age_ms: 0,
-                    dense_ms: 21_000,
-                    by: 3,
+                    ..CrowdRow::default()
                 },
                 CrowdRow {
                     sector: 3,
                     high: 2,
-                    age_ms: 1_000,
+                    age_s: 1,
                     sure: Sure::Eased,
-                    sure_age_ms: 1_000,
                     ..CrowdRow::default()
                 },
             ],
+            dense: vec![CrowdDense {
+                sector: 2,
+                dense_s: 21,
+                by: 3,
+            }],
         }
     }
 
@@ -222,17 +263,21 @@ pub(crate) mod samples {
             people: u16::MAX,
             low: u16::MAX,
             high: u16::MAX,
-            age_ms: DURATION_MAX_MS,
+            age_s: AGO_MAX_S,
             came: -CAME_MAX,
             sure: Sure::Dense,
-            sure_age_ms: DURATION_MAX_MS,
-            dense_ms: DURATION_MAX_MS,
+            sure_before_s: AGO_MAX_S,
+        };
+        let dense = |sector| CrowdDense {
+            sector,
+            dense_s: AGO_MAX_S,
             by: u16::MAX,
         };
         vec![Body::Crowd(CrowdTile {
             crowd: u32::MAX,
-            time_ms: TIME_MAX_MS,
+            time_s: TIME_MAX_S,
             rows: (0..16).map(row).collect(),
+            dense: (0..16).map(dense).collect(),
         })]
     }
 }

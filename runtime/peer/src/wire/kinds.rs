@@ -308,7 +308,7 @@ const TABLE: [KindRow; 21] = [
         ..row(
             Kind::Crowd,
             "crowd",
-            640,
+            560,
             Priority::Telemetry,
             Lifetime::Ms(60_000),
         )

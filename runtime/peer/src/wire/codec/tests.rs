@@ -466,18 +466,20 @@ fn every_limit_is_sharp() {
                     refused(&Body::Crowd(t), field);
                 };
                 with(&|t| t.rows.push(t.rows[15]), "rows");
-                with(&|t| t.time_ms += 1, "time_ms");
-                with(&|t| t.time_ms = 5, "age_ms");
+                with(&|t| t.dense.push(t.dense[15]), "dense");
+                with(&|t| t.time_s += 1, "time_s");
+                with(&|t| t.time_s = 5, "age_s");
                 with(&|t| t.rows[15].sector += 1, "sector");
                 with(&|t| t.rows[1].sector = 0, "rows");
                 with(&|t| t.rows[1].people -= 1, "low");
                 with(&|t| t.rows[1].high -= 1, "high");
-                with(&|t| t.rows[1].age_ms += 1, "age_ms");
+                with(&|t| t.rows[1].age_s += 1, "age_s");
                 with(&|t| t.rows[1].came -= 1, "came");
-                with(&|t| t.rows[1].sure = Sure::None, "sure_age_ms");
-                with(&|t| t.rows[1].sure_age_ms += 1, "sure_age_ms");
-                with(&|t| t.rows[1].dense_ms += 1, "dense_ms");
-                with(&|t| t.rows[1].sure = Sure::Eased, "dense_ms");
+                with(&|t| t.rows[1].sure = Sure::None, "sure_before_s");
+                with(&|t| t.rows[1].sure_before_s += 1, "sure_before_s");
+                with(&|t| t.rows[1].sure = Sure::Eased, "dense");
+                with(&|t| t.dense[1].sector = 0, "dense");
+                with(&|t| t.dense[1].dense_s += 1, "dense_s");
             }
             Body::Count(c) => {
                 kinds += 1;
