@@ -6,14 +6,15 @@
 //! | a look, and all of a sector is in it for certain | how many people it holds, with a range; the look before is out of date |
 //! | by that look it is certainly too dense, or has certainly eased | so it is from then on; what is neither is what it was |
 //! | a sector became too dense, or eased, in the own pictures | told at once |
-//! | its looks are newer than those that anybody told by the mission's interval, or differ from them for certain | told a few seconds later, with all of the tile |
+//! | its looks are newer than those that anybody told by the mission's interval, or differ from them for certain | told a few seconds later, with all that is known of the tile |
+//! | nobody told as much as is known here of a tile for four intervals, or two beacon intervals since this peer told that it became too dense | told again |
 //! | a tile of another, or the own one as it is told | of each sector the newest look is kept, and the newest one that was sure |
 //! | a sector is too dense by that, and was not, or the other way round | told to people here |
 //! | another life begins, another event or another sortie | its own looks begin at nothing |
 //!
 //! A sector is counted in one picture, so whoever walks from one into the next is in one of them.
 //! That a later look goes before is a join: whoever heard the same knows the same, in whatever
-//! order it came.
+//! order it came. Nobody repairs what is lost: whoever knows more says so in its turn.
 //!
 //! # Guarantees
 //! Bounded: 1,024 sectors, and as many of another event until it is known which one counts. Nothing
@@ -55,6 +56,16 @@ const GATHERED_MS: u64 = 4_000;
 /// copies take a tenth of the air of 64 kbit/s.
 const TURN_INTERVALS: u64 = 2;
 
+/// What nobody told for so many of the mission's intervals is told again.
+const AGAIN: u64 = 4;
+
+/// And so many beacon intervals later by who has the next higher number: it is told by one.
+const RANK_INTERVALS: u64 = 4;
+
+/// That a sector became too dense, or eased, is told so often, so many beacon intervals apart.
+const URGENT_TIMES: u8 = 2;
+const URGENT_INTERVALS: u64 = 2;
+
 /// At the end everything is told that is so much newer than what is known, milliseconds.
 const LAST_MS: u64 = 1_000;
 
@@ -94,6 +105,10 @@ pub(crate) struct Gathering {
     told: BTreeMap<u16, Time>,
     /// Since when each own tile has news.
     news: BTreeMap<u16, Time>,
+    /// When somebody told all that is known here of a tile.
+    heard: BTreeMap<u16, Time>,
+    /// How often a tile is told again soon.
+    again: BTreeMap<u16, u8>,
     said_at: Time,
     last_ms: u64,
 }
@@ -102,6 +117,7 @@ pub(crate) struct Gathering {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum News {
     None,
+    Again,
     Some,
     Urgent,
 }
@@ -125,6 +141,7 @@ impl Gathering {
         self.own.clear();
         self.told.clear();
         self.news.clear();
+        self.again.clear();
     }
 
     /// The event of the mission.
@@ -217,7 +234,6 @@ impl Gathering {
         let goes_on = newest.verdict.and_then(|v| v.dense);
         let verdict = (dense || eased).then(|| Verdict {
             at_ms: now_ms,
-            by: self.me,
             dense: dense.then(|| goes_on.unwrap_or((now_ms, self.me))),
         });
         let is_better = own.sector.look.is_none_or(|held| {
@@ -263,68 +279,100 @@ impl Gathering {
     }
 
     /// What is to be told now: one tile at a time, where a sector became too dense or eased first.
-    /// So many UAVs share the air.
-    pub fn tell(&mut self, now: Time, (beacon_ms, uavs): (u64, u64), looks: bool) -> Effects {
+    /// So many UAVs share the air, of whom so many have lower numbers.
+    pub fn tell(
+        &mut self,
+        now: Time,
+        (beacon_ms, uavs, rank): (u64, u64, u64),
+        looks: bool,
+    ) -> Effects {
         let Some(Followed { of, watch }) = self.followed.clone() else {
             return Effects::new();
         };
-        if self.own.is_empty() || now.since_ms(self.said_at) < beacon_ms {
+        if now.since_ms(self.said_at) < beacon_ms {
             return Effects::new();
         }
-        let interval_ms = if looks {
-            1_000 * u64::from(watch.interval_s)
-        } else {
-            LAST_MS
-        };
-        let tiles: BTreeSet<u16> = self.own.keys().map(|s| s / SECTORS_EACH).collect();
+        let interval_ms = 1_000 * u64::from(watch.interval_s);
+        let newer_ms = if looks { interval_ms } else { LAST_MS };
+        let again_ms = AGAIN * interval_ms + RANK_INTERVALS * beacon_ms * rank;
+        let is_turn = now.since_ms(self.said_at) >= TURN_INTERVALS * beacon_ms * uavs;
+        let known = self.known.range((of, 0)..=(of, u16::MAX));
+        let tiles: BTreeSet<u16> = known
+            .map(|((_, s), _)| s / SECTORS_EACH)
+            .chain(self.own.keys().map(|s| s / SECTORS_EACH))
+            .collect();
         let mut due: Option<(News, u64, u16)> = None;
         for tile in tiles {
-            let news = self.news_of(tile, (of, interval_ms));
+            let (mut news, mut since_ms) = (self.news_of(tile, (of, newer_ms)), 0);
             if news == News::None {
                 self.news.remove(&tile);
-                continue;
+                let heard_ms = now.since_ms(*self.heard.entry(tile).or_insert(now));
+                let is_soon =
+                    self.again.contains_key(&tile) && heard_ms >= URGENT_INTERVALS * beacon_ms;
+                if is_soon || heard_ms >= again_ms {
+                    (news, since_ms) = (News::Again, heard_ms);
+                }
+                if is_soon {
+                    news = News::Urgent;
+                }
+            } else {
+                since_ms = now.since_ms(*self.news.entry(tile).or_insert(now));
             }
-            let since_ms = now.since_ms(*self.news.entry(tile).or_insert(now));
             let told_ms = self.told.get(&tile).map_or(u64::MAX, |t| now.since_ms(*t));
             let is_gathered = since_ms >= GATHERED_MS && told_ms >= interval_ms / 2;
-            let is_turn = now.since_ms(self.said_at) >= TURN_INTERVALS * beacon_ms * uavs;
-            let is_due = news == News::Urgent || (is_gathered || !looks) && is_turn;
+            let is_due = match news {
+                News::None => false,
+                News::Again => is_turn,
+                News::Some => is_turn && (is_gathered || !looks),
+                News::Urgent => true,
+            };
             if is_due && due.is_none_or(|d| (news, since_ms) > (d.0, d.1)) {
                 due = Some((news, since_ms, tile));
             }
         }
-        let Some((.., tile)) = due else {
+        let Some((news, _, tile)) = due else {
             return Effects::new();
         };
+        self.note_urgent(tile, news);
         self.news.remove(&tile);
         self.told.insert(tile, now);
         self.said_at = now;
         let told = self.register(tile, of);
-        let mut effects = self.learn((self.me, tile), &told);
+        let mut effects = self.learn(now, tile, &told);
+        self.heard.insert(tile, now);
         effects.push(Effect::Speak(tile, Body::Crowd(told)));
         effects
     }
 
-    /// An own tile as it is now: what somebody saw later is left out.
+    /// What is urgent is told more than once.
+    fn note_urgent(&mut self, tile: u16, news: News) {
+        let left = match self.again.get(&tile) {
+            Some(left) => left - 1,
+            None if news == News::Urgent => URGENT_TIMES - 1,
+            None => 0,
+        };
+        if left > 0 {
+            self.again.insert(tile, left);
+        } else {
+            self.again.remove(&tile);
+        }
+    }
+
+    /// All that is known of a tile, told or not.
     fn register(&self, tile: u16, of: u32) -> CrowdTile {
         let first = SECTORS_EACH * tile;
-        let own = self.own.range(first..first + SECTORS_EACH);
-        let rows = own.filter_map(|(sector, own)| {
-            let known = self.known.get(&(of, *sector)).copied().unwrap_or_default();
-            let look = own.sector.look?;
-            // What nobody says later stands in some register for good, so whoever comes gets it.
-            let is_sure = own.sector.verdict.is_some() && own.sector.verdict >= known.verdict;
-            let is_of_use = Some(look) >= known.look || is_sure;
-            is_of_use.then_some((*sector, look, own.sector.verdict))
+        let all = (first..first + SECTORS_EACH).filter_map(|n| {
+            let sector = self.newest(of, n);
+            Some((n, sector.look?, sector.verdict))
         });
-        let rows: Vec<(u16, Look, Option<Verdict>)> = rows.collect();
-        let time_ms = rows.iter().map(|(_, l, _)| l.seen_ms).max().unwrap_or(0);
+        let all: Vec<(u16, Look, Option<Verdict>)> = all.collect();
+        let time_ms = all.iter().map(|(_, l, _)| l.seen_ms).max().unwrap_or(0);
         let mut tile = CrowdTile {
             crowd: of,
             time_s: time_ms / 1_000,
             ..CrowdTile::default()
         };
-        for (sector, look, verdict) in rows {
+        for (sector, look, verdict) in all {
             if let Some((row, dense)) = row_of((sector, time_ms), &look, verdict.as_ref()) {
                 tile.rows.push(row);
                 tile.dense.extend(dense);
@@ -334,11 +382,12 @@ impl Gathering {
     }
 
     /// What another tells.
-    pub fn hear(&mut self, author: u16, tile: u16, told: &CrowdTile) -> Effects {
-        self.learn((author, tile), told)
+    pub fn hear(&mut self, now: Time, tile: u16, told: &CrowdTile) -> Effects {
+        self.learn(now, tile, told)
     }
 
-    fn learn(&mut self, (author, tile): (u16, u16), told: &CrowdTile) -> Effects {
+    fn learn(&mut self, now: Time, tile: u16, told: &CrowdTile) -> Effects {
+        let followed = self.followed.clone().filter(|f| f.of == told.crowd);
         let of = self.followed.as_ref().map(|f| f.of);
         let mut effects = Effects::new();
         for row in &told.rows {
@@ -353,17 +402,35 @@ impl Gathering {
             let held = self.known.entry(key).or_default();
             let before = *held;
             let dense = told.dense.iter().find(|d| d.sector == row.sector);
-            *held = before.joined(Sector::of((row, dense), told.time_s, author));
-            let now = *held;
-            let is_followed = self.followed.as_ref().filter(|f| f.of == told.crowd);
-            if let Some(f) = is_followed
-                && before.dense().is_some() != now.dense().is_some()
-                && let Some(told) = now.alert(&f.watch, sector)
+            *held = before.joined(Sector::of((row, dense), told.time_s));
+            let after = *held;
+            if let Some(f) = &followed
+                && before.dense().is_some() != after.dense().is_some()
+                && let Some(told) = after.alert(&f.watch, sector)
             {
                 effects.push(Effect::Report(Report::Crowd { told }));
             }
         }
+        if followed.is_some() && self.is_all(tile, told) {
+            self.heard.insert(tile, now);
+        }
         effects
+    }
+
+    /// Whether all that is known of a tile was told so.
+    fn is_all(&self, tile: u16, told: &CrowdTile) -> bool {
+        let first = SECTORS_EACH * tile;
+        let known = self
+            .known
+            .range((told.crowd, first)..(told.crowd, first + SECTORS_EACH));
+        let said = |n: u16| {
+            let within = |sector: u8| first + u16::from(sector) == n;
+            let row = told.rows.iter().find(|r| within(r.sector))?;
+            let dense = told.dense.iter().find(|d| within(d.sector));
+            Some(Sector::of((row, dense), told.time_s))
+        };
+        let mut all = known.map(|((_, n), s)| (*n, *s));
+        all.all(|(n, s)| said(n) == Some(s))
     }
 
     /// What all together saw, as far as is known here; none without an event.
@@ -439,6 +506,7 @@ fn row_of(
         low: look.low,
         high: look.high,
         age_s: before(look.seen_ms, time_ms)?,
+        seen_by: look.by,
         came: look.came,
         ..CrowdRow::default()
     };

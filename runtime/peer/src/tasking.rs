@@ -273,7 +273,7 @@ impl Tasking {
                 self.using.hear(by, record.subject, usage);
                 Effects::new()
             }
-            Body::Crowd(tile) => self.gathering.hear(record.author, record.subject, tile),
+            Body::Crowd(tile) => self.gathering.hear(now, record.subject, tile),
             Body::Task(task) => {
                 let id = TaskId {
                     author: record.author,

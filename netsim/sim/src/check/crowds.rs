@@ -26,6 +26,7 @@ use skein_geometry::frame::Point;
 use skein_peer::Mission;
 use skein_peer::crowd::CrowdWatch;
 use skein_peer::gathering::{Crowd, CrowdAlert, Sector};
+use skein_peer::wire::crowd::SECTORS_EACH;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -51,6 +52,9 @@ const LOOKS: u64 = 3;
 
 /// Of looks at one time a UAV may keep an earlier one that tells more exactly, milliseconds.
 const KEPT_MS: u64 = 6_000;
+
+/// What is told again may be lost again.
+const AGAIN_FACTOR: u64 = 2;
 
 /// Who knows that a sector became too dense tells so within so many of its intervals: one tile at
 /// a time, four of them in a picture, when what was said before has gone out.
@@ -109,7 +113,6 @@ pub struct CrowdCheck {
     /// Ranges that hold, of so many.
     ranges: (u32, u32),
     lacks: BTreeMap<(u16, u16), Lack>,
-    booted_ms: BTreeMap<u16, u64>,
     people_at_ms: u64,
     /// How often the number of people was in its range: at the looks, and now.
     people_then: (u32, u32),
@@ -136,7 +139,6 @@ impl CrowdCheck {
             revision: mission.revision,
             truth: Truth::new(watch),
             watch: Some(Arc::clone(watch)),
-            booted_ms: core::mem::take(&mut self.booted_ms),
             ..Self::default()
         };
     }
@@ -145,11 +147,6 @@ impl CrowdCheck {
     #[must_use]
     pub fn is_idle(&self) -> bool {
         self.watch.is_none()
-    }
-
-    /// A process starts: what an earlier life of it said nobody passes on.
-    pub fn on_boot(&mut self, now_ms: u64, id: u16) {
-        self.booted_ms.insert(id, now_ms);
     }
 
     /// Where people are now.
@@ -378,13 +375,7 @@ impl CrowdCheck {
                 let joined = all.entry(*sector).or_default();
                 *joined = joined.joined(*s);
             }
-            // What an earlier life said nobody passes on.
-            let former = |s: &Sector| {
-                let is_of = |by: u16, ms: u64| self.booted_ms.get(&by).is_some_and(|b| *b >= ms);
-                let look = s.look.is_some_and(|l| is_of(l.by, l.seen_ms));
-                look || s.verdict.is_some_and(|v| is_of(v.by, v.at_ms))
-            };
-            all.retain(|_, s| !former(s));
+            let again_ms = self.again_ms(snapshot, here.len());
             for m in &here {
                 let held: BTreeMap<u16, Sector> = m.view.crowd.iter().copied().collect();
                 for (sector, wanted) in &all {
@@ -405,7 +396,10 @@ impl CrowdCheck {
                     }
                     let from_ms = lack.since_ms.max(whole_ms).max(m.since_ms);
                     let took_ms = snapshot.now_ms - from_ms;
-                    let (bound_ms, factor) = record_limit(&snapshot.bounds, here.len());
+                    let is_urgent = held.dense().is_some() != wanted.dense().is_some();
+                    let (record_ms, factor) = record_limit(&snapshot.bounds, here.len());
+                    let bound_ms = record_ms + if is_urgent { 0 } else { again_ms };
+                    let factor = if is_urgent { factor } else { AGAIN_FACTOR };
                     let limit_ms = light_limit_ms(snapshot, bound_ms, factor, from_ms);
                     let is_late = limit_ms.is_some_and(|l| took_ms > l);
                     if is_late && !core::mem::replace(&mut lack.told, true) {
@@ -417,6 +411,15 @@ impl CrowdCheck {
             }
         }
         self.lacks.retain(|k, _| lacking.contains(k));
+    }
+
+    /// Within how long what somebody knows is told again: nobody told it for four of the mission's
+    /// intervals, and then all tiles in turn.
+    fn again_ms(&self, snapshot: &Snapshot<'_>, uavs: usize) -> u64 {
+        let Some(watch) = &self.watch else { return 0 };
+        let tiles = 1 + u64::from(watch.sectors().last().unwrap_or(0) / SECTORS_EACH);
+        let rank = u64::try_from(uavs).unwrap_or(0);
+        4_000 * u64::from(watch.interval_s) + (2 * tiles + 4 * rank) * snapshot.bounds.interval_ms
     }
 
     /// The run is over.

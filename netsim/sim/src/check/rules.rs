@@ -154,7 +154,6 @@ impl Rules {
         self.loops.remove(&id);
         self.cadence.on_boot(now_ms, id);
         self.activity.on_boot(now_ms, id);
-        self.crowds.on_boot(now_ms, id);
     }
 
     /// A process ends, with all that it knew, or stands still (`death` is false).

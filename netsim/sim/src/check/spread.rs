@@ -102,9 +102,10 @@ pub(super) fn record_limit(bounds: &Bounds, peers: usize) -> (u64, u64) {
 
 /// Whether a record reaches everybody: passed on, and worth it for longer than the two
 /// periods of a state, which is for people and is said again soon. Pieces of a mission reach
-/// who follows an older one: that is `agree`. Trails are said again in turn by their authors.
+/// who follows an older one: that is `agree`. Trails are said again in turn by their authors, and what is known of
+/// a mass event by whoever knows it: that is `crowd-agree`.
 fn spreads(kind: u8) -> bool {
-    let some = [Kind::State, Kind::Mission, Kind::Trail];
+    let some = [Kind::State, Kind::Mission, Kind::Trail, Kind::Crowd];
     Kind::of_number(kind).is_some_and(|k| k.relayed() && !some.contains(&k))
 }
 

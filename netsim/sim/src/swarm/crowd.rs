@@ -23,6 +23,9 @@ impl Swarm {
         let Some(people) = world.crowd() else { return };
         self.checker.rules.crowds.on_people(people);
         let peer = &self.peers[idx];
+        if !people.looks_at(self.now_ms) {
+            return;
+        }
         if peer.process != Process::Running {
             return;
         }
@@ -38,7 +41,7 @@ impl Swarm {
             uav: (id, life),
             picture: body.picture(),
             is_late: peer.slow_ms > 0,
-            looks: people.looks_at(self.now_ms) && body.takes_off_in_ms(self.now_ms) == 0,
+            looks: body.takes_off_in_ms(self.now_ms) == 0,
             sees: &|at: Point| world.is_open_to(id, at),
             own: &own,
             known: &known,

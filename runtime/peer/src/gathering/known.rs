@@ -36,8 +36,6 @@ pub struct Look {
 pub struct Verdict {
     /// By a look at that time, milliseconds of the clock of percepts.
     pub at_ms: u64,
-    /// By whom that look was.
-    pub by: u16,
     /// Where it is too dense, since when, and by whom that was seen first.
     pub dense: Option<(u64, u16)>,
 }
@@ -52,27 +50,19 @@ pub struct Sector {
 }
 
 impl Sector {
-    /// As an author tells of it.
-    pub(super) fn of(
-        (row, dense): (&CrowdRow, Option<&CrowdDense>),
-        time_s: u64,
-        author: u16,
-    ) -> Self {
+    /// As it is told.
+    pub(super) fn of((row, dense): (&CrowdRow, Option<&CrowdDense>), time_s: u64) -> Self {
         let before = |of_ms: u64, s: u32| of_ms.saturating_sub(1_000 * u64::from(s));
         let look = Look {
             seen_ms: before(1_000 * time_s, row.age_s),
-            by: author,
+            by: row.seen_by,
             people: row.people,
             low: row.low,
             high: row.high,
             came: row.came,
         };
         let at_ms = before(look.seen_ms, row.sure_before_s);
-        let verdict = |dense| Verdict {
-            at_ms,
-            by: author,
-            dense,
-        };
+        let verdict = |dense| Verdict { at_ms, dense };
         Self {
             look: Some(look),
             verdict: match (row.sure, dense) {
@@ -102,7 +92,7 @@ impl Sector {
     pub(super) fn alert(&self, watch: &CrowdWatch, sector: u16) -> Option<CrowdAlert> {
         let (look, verdict) = (self.look?, self.verdict?);
         let middle = watch.middle(sector)?;
-        let (since_ms, by) = verdict.dense.unwrap_or((verdict.at_ms, verdict.by));
+        let (since_ms, by) = verdict.dense.unwrap_or((verdict.at_ms, look.by));
         let error_m = f64::from(watch.sector_m) / 2.0 + ERRORS * PLACE_M;
         Some(CrowdAlert {
             sector,

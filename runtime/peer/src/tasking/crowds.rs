@@ -51,9 +51,16 @@ impl Tasking {
         let looks = !mission.cancelled && !state.stage.ended();
         let interval_ms = s.membership.interval_ms();
         let uav = |id: u16| s.membership.info(id).is_some_and(|i| !i.ground_station);
-        let others = s.membership.live().filter(|(id, _)| uav(*id)).count();
-        let uavs = 1 + u64::try_from(others).unwrap_or(0);
-        let mut effects = self.gathering.tell(s.now, (interval_ms, uavs), looks);
+        let others: Vec<u16> = s
+            .membership
+            .live()
+            .map(|(id, _)| id)
+            .filter(|id| uav(*id))
+            .collect();
+        let count = |n: usize| u64::try_from(n).unwrap_or(u64::MAX);
+        let rank = count(others.iter().filter(|id| **id < self.me).count());
+        let air = (interval_ms, 1 + count(others.len()), rank);
+        let mut effects = self.gathering.tell(s.now, air, looks);
         effects.extend(self.leave_eased(s, looks));
         if let Some(watch) = mission.crowd.as_ref().filter(|_| looks) {
             effects.extend(self.ask_for_looks(s, &mission, watch));

@@ -1,10 +1,10 @@
 //! What a UAV tells of the people of a mass event: type, bytes and limits of the kind `crowd`
 //! (docs/protocol.md §12, D2.7 §3.1).
 //!
-//! One register of sixteen sectors that lie together, a *tile*, made of the author's own pictures
-//! alone, in one of its lives: of each sector the newest look, and the newest one that was sure
-//! whether it is too dense. Of all authors and lives the newest looks count, so registers merge in
-//! any order, and nobody is counted in two of them.
+//! One register of sixteen sectors that lie together, a *tile*: all that its author knows of them,
+//! whoever saw it. Of each sector that is the newest look, and the newest one that was sure whether
+//! it is too dense. Of two registers the newer look counts, sector by sector, so they merge in any
+//! order, what a lost UAV saw is said by others, and nobody is counted in two looks.
 
 use super::cbor::{Listed, array_of, number_of};
 use super::codec::WireError;
@@ -25,7 +25,7 @@ pub const SECTORS_MAX: u16 = SECTORS_EACH * TILES_MAX;
 /// Most people who certainly came or left between two looks at one sector.
 pub const CAME_MAX: i32 = 65_535;
 
-/// What the newest sure look of an author at a sector said.
+/// What the newest sure look at a sector said.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]
@@ -40,7 +40,7 @@ pub enum Sure {
     Dense,
 }
 
-/// One sector as one author saw it last in one life.
+/// One sector as it was seen last.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]
@@ -55,6 +55,8 @@ pub struct CrowdRow {
     pub high: u16,
     /// How long before the time of the register it was looked at, seconds.
     pub age_s: u32,
+    /// By whom.
+    pub seen_by: u16,
     /// How many more there certainly were than in the look before; fewer below 0.
     pub came: i32,
     /// What the newest sure look said.
@@ -76,7 +78,7 @@ pub struct CrowdDense {
     pub by: u16,
 }
 
-/// The sectors of a tile that one author saw in one life.
+/// The sectors of a tile that its author knows of.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct CrowdTile {
     /// Of which event of which sortie: `Mission::crowd_hash`.
@@ -96,6 +98,7 @@ array_of!(CrowdRow {
     low,
     high,
     age_s,
+    seen_by,
     came,
     sure,
     sure_before_s
@@ -173,6 +176,7 @@ const ROW: &[Place] = &[
         "how long before the time of the register it was looked at, s",
         AGO,
     ),
+    at("seen_by", "by whom", U16),
     at(
         "came",
         "how many more there certainly were than in the look before; fewer below 0",
@@ -236,6 +240,7 @@ pub(crate) mod samples {
                     people: 1_640,
                     low: 1_480,
                     high: 1_790,
+                    seen_by: 2,
                     came: 310,
                     sure: Sure::Dense,
                     ..CrowdRow::default()
@@ -264,6 +269,7 @@ pub(crate) mod samples {
             low: u16::MAX,
             high: u16::MAX,
             age_s: AGO_MAX_S,
+            seen_by: u16::MAX,
             came: -CAME_MAX,
             sure: Sure::Dense,
             sure_before_s: AGO_MAX_S,
