@@ -310,7 +310,7 @@ impl Gathering {
                 let is_soon =
                     self.again.contains_key(&tile) && heard_ms >= URGENT_INTERVALS * beacon_ms;
                 if is_soon || heard_ms >= again_ms {
-                    (news, since_ms) = (News::Again, heard_ms);
+                    (news, since_ms) = (News::Again, heard_ms.saturating_sub(again_ms));
                 }
                 if is_soon {
                     news = News::Urgent;
@@ -326,7 +326,9 @@ impl Gathering {
                 News::Some => is_turn && (is_gathered || !looks),
                 News::Urgent => true,
             };
-            if is_due && due.is_none_or(|d| (news, since_ms) > (d.0, d.1)) {
+            // What waits longest goes first, or nothing would be told again while there is news.
+            let order = (news == News::Urgent, since_ms);
+            if is_due && due.is_none_or(|d| order > (d.0 == News::Urgent, d.1)) {
                 due = Some((news, since_ms, tile));
             }
         }

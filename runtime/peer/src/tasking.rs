@@ -366,7 +366,7 @@ impl Tasking {
             effects.extend(self.take_brought(s.now, mission, ended));
             effects.retain(|e| !matches!(e, Effect::Negotiate));
             effects.extend(self.tell_of_tasks(s));
-            self.gathering.follow(&state.geometry.mission);
+            effects.extend(self.tell_of_event(s, state));
             return effects;
         }
         let geometry = std::sync::Arc::clone(&state.geometry);

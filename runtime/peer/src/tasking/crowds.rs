@@ -41,26 +41,30 @@ impl Tasking {
         }
     }
 
-    /// Tells what is to be told of the event, and asks for looks at it.
-    pub(super) fn watch_event(&mut self, s: &Situation<'_>, state: &MissionState) -> Effects {
-        let mission = Arc::clone(&state.geometry.mission);
-        self.gathering.follow(&mission);
+    /// Tells what is to be told of the event: of a ground station what nobody else does.
+    pub(super) fn tell_of_event(&mut self, s: &Situation<'_>, state: &MissionState) -> Effects {
+        self.gathering.follow(&state.geometry.mission);
         if !s.speaks {
             return Effects::new();
         }
-        let looks = !mission.cancelled && !state.stage.ended();
-        let interval_ms = s.membership.interval_ms();
         let uav = |id: u16| s.membership.info(id).is_some_and(|i| !i.ground_station);
-        let others: Vec<u16> = s
-            .membership
-            .live()
-            .map(|(id, _)| id)
-            .filter(|id| uav(*id))
-            .collect();
-        let count = |n: usize| u64::try_from(n).unwrap_or(u64::MAX);
-        let rank = count(others.iter().filter(|id| **id < self.me).count());
-        let air = (interval_ms, 1 + count(others.len()), rank);
-        let mut effects = self.gathering.tell(s.now, air, looks);
+        let others = s.membership.live().map(|(id, _)| id).filter(|id| uav(*id));
+        let (mut uavs, mut rank) = (1, 0);
+        for id in others {
+            uavs += 1;
+            rank += u64::from(id < self.me || self.flies.is_none());
+        }
+        let air = (s.membership.interval_ms(), uavs, rank);
+        self.gathering.tell(s.now, air, looks_at(state))
+    }
+
+    /// Tells of the event, and asks for looks at it.
+    pub(super) fn watch_event(&mut self, s: &Situation<'_>, state: &MissionState) -> Effects {
+        let mut effects = self.tell_of_event(s, state);
+        if !s.speaks {
+            return effects;
+        }
+        let (mission, looks) = (Arc::clone(&state.geometry.mission), looks_at(state));
         effects.extend(self.leave_eased(s, looks));
         if let Some(watch) = mission.crowd.as_ref().filter(|_| looks) {
             effects.extend(self.ask_for_looks(s, &mission, watch));
@@ -132,6 +136,11 @@ impl Tasking {
     pub fn own_crowd(&self) -> impl Iterator<Item = (u16, Sector)> {
         self.gathering.own()
     }
+}
+
+/// Whether looks at the event count.
+fn looks_at(state: &MissionState) -> bool {
+    !state.geometry.mission.cancelled && !state.stage.ended()
 }
 
 /// In which register of its author a look at a sector is asked for.
