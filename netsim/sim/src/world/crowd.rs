@@ -317,3 +317,121 @@ fn index(low: (i32, i32), size: (i32, i32), (col, row): (i32, i32)) -> Option<us
         .then(|| usize::try_from(i64::from(r) * i64::from(size.0) + i64::from(c)).ok())
         .flatten()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::{MoveSpec, Spec};
+    use crate::world::{World, fixture};
+
+    fn field(east: f64, north: f64, side: f64) -> Field {
+        Field {
+            low: (east, north),
+            high: (east + side, north + side),
+        }
+    }
+
+    /// Two thousand about the launch place of the first UAV, half of whom walk away east.
+    fn spec() -> Spec {
+        let spec = fixture::square(1);
+        let at = spec.uavs[0].launch.position();
+        let group = |moves| GroupSpec {
+            people: 1_000,
+            at: field(at.x - 20.0, at.y - 20.0, 40.0),
+            moves,
+        };
+        let going = MoveSpec {
+            from_ms: 10_000,
+            over_ms: 20_000,
+            way: vec![Point::new(at.x + 60.0, at.y)],
+            to: field(at.x + 100.0, at.y - 10.0, 20.0),
+            speed_mps: 1.2,
+        };
+        let crowd = CrowdSpec {
+            groups: vec![group(Vec::new()), group(vec![going])],
+            ..CrowdSpec::default()
+        };
+        Spec {
+            crowd: Some(crowd),
+            ..spec
+        }
+    }
+
+    fn all(crowd: &Crowd) -> u32 {
+        crowd.cells.iter().map(|n| u32::from(*n)).sum()
+    }
+
+    #[test]
+    fn people_walk_and_nobody_is_lost() {
+        let spec = spec();
+        let at = spec.uavs[0].launch.position();
+        let mut crowd = Crowd::new(spec.crowd.as_ref().unwrap(), 200, 4);
+        let near = Point::new(
+            (at.x / 2.0).round() * 2.0 - 24.0,
+            (at.y / 2.0).round() * 2.0 - 24.0,
+        );
+        assert_eq!((all(&crowd), crowd.people()), (2_000, 2_000));
+        assert_eq!(crowd.within(near, 48.0), 2_000);
+        crowd.advance(60_000);
+        let (under_way, on) = (crowd.within(near, 48.0), all(&crowd));
+        assert_eq!(on, 2_000);
+        crowd.advance(400_000);
+        let left = crowd.within(near, 48.0);
+        assert!(left == 1_000 && under_way >= left && under_way < 2_000);
+        let again = Crowd::new(spec.crowd.as_ref().unwrap(), 200, 4);
+        let mut other = Crowd::new(spec.crowd.as_ref().unwrap(), 200, 5);
+        other.advance(0);
+        assert!(again.cells != other.cells, "places are drawn from the seed");
+    }
+
+    #[test]
+    fn a_group_is_larger_or_smaller_by_the_seed_within_what_is_said() {
+        let crowd = CrowdSpec {
+            vary_permille: 100,
+            vary_ms: 5_000,
+            ..spec().crowd.unwrap()
+        };
+        let people = |seed| Crowd::new(&crowd, 200, seed).people();
+        let all: Vec<usize> = (0..20).map(people).collect();
+        assert!(all.iter().all(|n| (1_800..=2_200).contains(n)));
+        assert!(all.iter().any(|n| *n < 1_950) && all.iter().any(|n| *n > 2_050));
+        assert_eq!(people(3), people(3));
+    }
+
+    #[test]
+    fn a_look_tells_about_as_many_as_are_there_in_whole_squares_of_its_picture() {
+        let spec = spec();
+        let uav = spec.uavs[0].id;
+        let world = World::new(&spec, 5);
+        let told = world.percept(uav).unwrap().crowd;
+        assert_eq!(
+            told,
+            world.percept(uav).unwrap().crowd,
+            "drawn from the time alone"
+        );
+        let picture = world.body(uav).unwrap().picture();
+        assert!(told.seen().iter().all(|s| picture.holds(&s.corners())));
+        let seen: u32 = told.seen().iter().map(|s| u32::from(s.people)).sum();
+        let truly: u32 = told
+            .seen()
+            .iter()
+            .map(|s| world.crowd().unwrap().within(s.corners()[0], SQUARE_M))
+            .sum();
+        // 80 to 90 % of them, and places are off by some metres.
+        let share = f64::from(seen) / f64::from(truly.max(1));
+        assert!(
+            truly > 500 && (0.65..1.05).contains(&share),
+            "{seen} of {truly}"
+        );
+        let without = World::new(&fixture::square(1), 5);
+        assert!(without.percept(uav).unwrap().crowd.is_absent());
+    }
+
+    #[test]
+    fn a_recogniser_looks_once_a_second() {
+        let spec = spec();
+        let crowd = Crowd::new(spec.crowd.as_ref().unwrap(), 200, 4);
+        let looks = (0..10_u64).map(|k| crowd.looks_at(60 + 200 * k));
+        assert_eq!(looks.filter(|l| *l).count(), 2);
+    }
+}

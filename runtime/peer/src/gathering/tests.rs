@@ -49,7 +49,7 @@ impl Scene {
         });
         let percept = Percept {
             crowd: CrowdLook::new(squares),
-            ..crate::testing::percept(1_000 * self.now_s, Pose::new(Point::new(30.0, 70.0), 0.0))
+            ..percept(1_000 * self.now_s)
         };
         self.gathering.look(&percept, &flies, true);
     }
@@ -78,6 +78,26 @@ impl Scene {
     }
 }
 
+fn percept(time_ms: u64) -> Percept {
+    Percept {
+        time_ms,
+        pose: Pose::new(Point::new(30.0, 70.0), 0.0),
+        height_m: 60.0,
+        airspeed_mps: 13.0,
+        wind_east_mps: 0.0,
+        wind_north_mps: 0.0,
+        wind_unknown: false,
+        attitude: None,
+        contour: skein_behaviors::contour::ContourLook::default(),
+        crowd: CrowdLook::default(),
+        endurance_s: 3_000.0,
+        takes_off_in_ms: 0,
+        failsafe: false,
+        traffic: skein_behaviors::traffic::Traffic::default(),
+        sightings: skein_behaviors::sightings::Sightings::default(),
+    }
+}
+
 fn alerts(effects: Effects) -> Vec<CrowdAlert> {
     let told = effects.into_iter().filter_map(|e| match e {
         Effect::Report(Report::Crowd { told }) => Some(told),
@@ -91,10 +111,16 @@ fn sectors_that_are_all_in_the_picture_are_counted_with_a_range() {
     let mut scene = Scene::new(7);
     scene.look(85);
     let own: Vec<(u16, Sector)> = scene.gathering.own().collect();
-    // Columns 0 to 5 and rows 5 to 8 hold two sectors each way that lie in them whole.
+    // Columns 0 to 5 and rows 5 to 8 of squares hold three sectors whole.
     let seen: Vec<u16> = own.iter().map(|(n, _)| *n).collect();
-    assert_eq!(seen.len(), 6, "{seen:?}");
-    let look = own.iter().find(|(n, _)| *n == SECTOR).unwrap().1.look.unwrap();
+    assert_eq!(seen, [5, 6, 7]);
+    let look = own
+        .iter()
+        .find(|(n, _)| *n == SECTOR)
+        .unwrap()
+        .1
+        .look
+        .unwrap();
     assert_eq!((look.people, look.by, look.came), (399, 7, 0));
     assert!(look.low < 399 && look.high > 399 && look.low > 330 && look.high < 470);
 }
@@ -186,12 +212,19 @@ fn nobody_is_counted_in_two_looks_and_who_walked_widens_the_range() {
     scene.look(100);
     scene.gathering.tell(Time(1_000 * scene.now_s), AIR, false);
     let of = |s: &Scene| {
-        let own = s.gathering.own().map(|(_, s)| s.look.unwrap());
-        (own.clone().map(|l| u32::from(l.people)).sum::<u32>(), own.map(|l| l.came).sum::<i32>())
+        let own: Vec<Look> = s.gathering.own().filter_map(|(_, s)| s.look).collect();
+        (
+            own.iter().map(|l| u32::from(l.people)).sum::<u32>(),
+            own.iter().map(|l| l.came).sum::<i32>(),
+        )
     };
     let before = of(&scene);
     scene.look(100);
-    assert_eq!(of(&scene), before, "a later look takes the place of the one before");
+    assert_eq!(
+        of(&scene),
+        before,
+        "a later look takes the place of the one before"
+    );
     scene.now_s += 30;
     scene.look(20);
     let (people, came) = of(&scene);
@@ -206,7 +239,11 @@ fn a_tilted_camera_counts_what_is_certainly_in_its_picture() {
         ..airframe()
     };
     scene.look_with(fixed, 100);
-    assert_eq!(scene.gathering.own().count(), 0, "nothing is told of its attitude");
+    assert_eq!(
+        scene.gathering.own().count(),
+        0,
+        "nothing is told of its attitude"
+    );
     scene.look(100);
     assert!(scene.gathering.own().count() > 0);
 }

@@ -308,7 +308,7 @@ const TABLE: [KindRow; 21] = [
         ..row(
             Kind::Crowd,
             "crowd",
-            560,
+            640,
             Priority::Telemetry,
             Lifetime::Ms(60_000),
         )
