@@ -80,6 +80,7 @@ fn mission() -> Mission {
         counts: Vec::new(),
         streets: None,
         layers: None,
+        crowd: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,
@@ -158,6 +159,7 @@ impl Uav {
             traffic: Traffic::default(),
             sightings: Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
+            crowd: skein_behaviors::crowd::CrowdLook::default(),
             attitude: None,
         }
     }

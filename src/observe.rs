@@ -198,6 +198,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Trail(b) => serde_json::to_value(b),
         Body::Count(b) => serde_json::to_value(b),
         Body::Usage(b) => serde_json::to_value(b),
+        Body::Crowd(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -311,6 +312,13 @@ fn words(author: u16, body: &Body) -> String {
             u.stretches.len(),
             u.stretches.iter().map(|s| s.spent_ds / 10).sum::<u32>(),
             u.turns.iter().map(|t| u32::from(t.vehicles)).sum::<u32>()
+        ),
+        Body::Crowd(t) => format!(
+            "knows of {} people in {} sectors of an event, {} of them too dense, by {} s of the clock of percepts",
+            t.rows.iter().map(|r| u32::from(r.people)).sum::<u32>(),
+            t.rows.len(),
+            t.dense.len(),
+            t.time_s
         ),
         Body::Trail(t) => format!(
             "tells {} places of a contour, the first seen at {} ms of the clock of percepts",

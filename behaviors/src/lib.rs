@@ -18,6 +18,7 @@
 
 pub mod attitude;
 pub mod contour;
+pub mod crowd;
 pub mod event;
 pub mod executive;
 pub mod order;

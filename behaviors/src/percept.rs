@@ -2,6 +2,7 @@
 
 use crate::attitude::Attitude;
 use crate::contour::ContourLook;
+use crate::crowd::CrowdLook;
 use crate::sightings::Sightings;
 use crate::traffic::Traffic;
 use serde::{Deserialize, Serialize};
@@ -46,6 +47,9 @@ pub struct Percept {
     /// What its camera sees of a contour.
     #[serde(default, skip_serializing_if = "ContourLook::is_absent")]
     pub contour: ContourLook,
+    /// What its camera sees of a crowd.
+    #[serde(default, skip_serializing_if = "CrowdLook::is_absent")]
+    pub crowd: CrowdLook,
     /// How it is tilted, where its camera is not held level by something else.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attitude: Option<Attitude>,

@@ -50,6 +50,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         traffic: crate::traffic::Traffic::default(),
         sightings: crate::sightings::Sightings::default(),
         contour: crate::contour::ContourLook::default(),
+        crowd: crate::crowd::CrowdLook::default(),
         attitude: None,
     }
 }

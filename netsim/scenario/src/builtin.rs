@@ -32,6 +32,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/streets.json5"),
     ),
     (
+        "event",
+        "event.json5",
+        include_str!("../../../configs/trials/event.json5"),
+    ),
+    (
         "parking",
         "parking.json5",
         include_str!("../../../configs/trials/parking.json5"),

@@ -75,6 +75,7 @@ pub(crate) fn blamed(e: &GeometryError) -> &'static str {
         GeometryError::Counts(_) => "mission.counts",
         GeometryError::Streets(..) => "mission.streets",
         GeometryError::Layers(_) => "mission.layers_m",
+        GeometryError::Crowd(..) => "mission.crowd",
         GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
             "no_fly"
         }

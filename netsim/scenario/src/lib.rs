@@ -42,6 +42,8 @@ mod feasibility;
 mod files;
 mod flight_model;
 mod forecast;
+#[cfg(test)]
+mod gathered;
 mod mission;
 mod mounts;
 #[cfg(test)]

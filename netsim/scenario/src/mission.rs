@@ -86,6 +86,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         tasks: s.brought.clone(),
         counts: s.counts.clone(),
         streets: s.streets.clone(),
+        crowd: s.crowd.clone(),
         tree: lanes.tree.unwrap_or_default(),
         division: s.division,
         separation_mm: length_mm((s.fleet.separation_m * 1000.0).ceil()),

@@ -298,6 +298,10 @@ pub fn report_hash(report: &Report) -> u64 {
             words(&mut h, 13, &[u64::from(id.author), u64::from(id.number)]);
             h.write(format!("{told:?}").as_bytes());
         }
+        Report::Crowd { told } => {
+            words(&mut h, 15, &[u64::from(told.sector)]);
+            h.write(format!("{told:?}").as_bytes());
+        }
         Report::Traced {
             length_m,
             area_m2,

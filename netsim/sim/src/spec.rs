@@ -59,6 +59,8 @@ pub struct Spec {
     pub vehicles: Vec<VehicleSpec>,
     /// A road or a fire that no peer knows, of which cameras see what is in their pictures.
     pub contour: Option<ContourSpec>,
+    /// The people of a mass event, of whom cameras see those in their pictures.
+    pub crowd: Option<CrowdSpec>,
     /// Faults of the scenario, ascending by time.
     pub faults: Vec<TimedFault>,
     /// From what random faults are drawn.
@@ -185,6 +187,52 @@ pub struct FireSpec {
     pub stretch: f64,
     /// Its head moves no farther than this, metres.
     pub most_m: f64,
+}
+
+/// The people of a mass event.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CrowdSpec {
+    /// Groups of them.
+    pub groups: Vec<GroupSpec>,
+    /// By up to so much of its people, in thousandths, each group is larger or smaller than said.
+    pub vary_permille: u16,
+    /// By up to so much each group walks earlier or later than said, milliseconds.
+    pub vary_ms: u32,
+}
+
+/// People who stand at one place first and go the same ways.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GroupSpec {
+    /// How many.
+    pub people: u32,
+    /// Where they stand first.
+    pub at: Field,
+    /// Where they go, one after the other.
+    pub moves: Vec<MoveSpec>,
+}
+
+/// A rectangle in which people stand, each at a place of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Field {
+    /// Its south-west corner, metres east and north.
+    pub low: (f64, f64),
+    /// Its north-east corner.
+    pub high: (f64, f64),
+}
+
+/// A way that a group goes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MoveSpec {
+    /// When the first sets off, milliseconds.
+    pub from_ms: u64,
+    /// Within so long after that the last does, milliseconds.
+    pub over_ms: u64,
+    /// Past which places.
+    pub way: Vec<Point>,
+    /// Where they stand then.
+    pub to: Field,
+    /// How fast they walk on the mean, m/s.
+    pub speed_mps: f64,
 }
 
 /// The ground station.

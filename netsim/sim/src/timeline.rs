@@ -103,6 +103,10 @@ fn reported(peer: u16, report: &Report, told: &mut BTreeSet<String>) -> Option<S
             let line = of.sentence(id.author);
             return told.insert(line.clone()).then_some(line);
         }
+        Report::Crowd { told: of } => {
+            let line = of.sentence();
+            return told.insert(line.clone()).then_some(line);
+        }
         Report::Traced { length_m, .. } => {
             format!("peer {peer} knows {length_m} m of a contour")
         }

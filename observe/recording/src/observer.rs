@@ -315,6 +315,20 @@ impl Observer {
                 let text = format!("{who}: {}", told.sentence(id.author));
                 (what, text)
             }
+            Report::Crowd { told } => {
+                let (per_m2, low_per_m2, high_per_m2) = told.per_m2();
+                let what = What::Crowd {
+                    by: told.by,
+                    east_m: f64::from(told.east_mm) / 1000.0,
+                    north_m: f64::from(told.north_mm) / 1000.0,
+                    error_m: f64::from(told.error_mm) / 1000.0,
+                    per_m2,
+                    low_per_m2,
+                    high_per_m2,
+                    dense: told.is_dense,
+                };
+                (what, format!("{who}: {}", told.sentence()))
+            }
             Report::Traced {
                 length_m, area_m2, ..
             } => {

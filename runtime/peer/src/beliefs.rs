@@ -3,6 +3,7 @@
 use crate::cells::CellSet;
 use crate::counting::SiteCount;
 use crate::diagram::MissionEvent;
+use crate::gathering::Sector;
 use crate::output::Status;
 use crate::tasking::Follows;
 use crate::wire::detection::Detection;
@@ -80,6 +81,8 @@ pub struct Beliefs {
     pub open_tasks: Vec<(TaskId, u32)>,
     /// Objects that its mission looks for, as it knows them.
     pub detections: Vec<(TaskId, Detection)>,
+    /// Sectors of the event that its mission watches, as it was told of them.
+    pub crowd: Vec<(u16, Sector)>,
     /// What it knows of a contour: of each author and register what was told last.
     pub trails: Vec<((u16, u16), Trail)>,
     /// Whether its UAV flies along a contour that it sees.

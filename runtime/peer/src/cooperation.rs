@@ -328,7 +328,8 @@ impl Cooperation {
             | Body::Target(_)
             | Body::Detection(_)
             | Body::Count(_)
-            | Body::Usage(_) => self.tasking.hear(now, record, body),
+            | Body::Usage(_)
+            | Body::Crowd(_) => self.tasking.hear(now, record, body),
             Body::Trail(trail) => {
                 self.trails.hear(record.author, record.subject, trail);
                 Effects::new()

@@ -139,6 +139,7 @@ fn told(report: &Report) -> Option<String> {
         Report::Revised { mission } => format!("was given revision {}", mission.revision),
         Report::Task { name, news, .. } => news.sentence(name),
         Report::Detected { id, told } => told.sentence(id.author),
+        Report::Crowd { told } => told.sentence(),
         Report::Traced { .. } => crate::trails::sentence(report),
         Report::Silenced => "was silenced: another process speaks under this id".to_owned(),
         Report::Alarm { text } => format!("alarm: {text}"),

@@ -2,6 +2,7 @@
 
 use crate::count_site::{CountSite, SITES_MAX};
 use crate::criteria::{CRITERIA_MAX, Criterion};
+use crate::crowd::CrowdWatch;
 use crate::diagram::{Diagram, DiagramError, Machine, check};
 use crate::input::NewTask;
 use crate::layers::Layers;
@@ -110,6 +111,9 @@ pub struct Mission {
     /// At which heights its laps are flown; all at one where none are said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layers: Option<Arc<Layers>>,
+    /// The mass event that is watched.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crowd: Option<Arc<CrowdWatch>>,
 }
 
 /// Whether a field need not be said.
@@ -181,6 +185,9 @@ pub enum GeometryError {
     /// Its layers cannot be flown.
     #[error("layers: {0}")]
     Layers(String),
+    /// The event that it watches has no sectors that can be seen, or no norm.
+    #[error("crowd.{0}: {1}")]
+    Crowd(&'static str, String),
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -338,6 +345,10 @@ impl Mission {
         if let Some(layers) = &self.layers {
             h.write_i64(-9);
             layers.hash(&mut h);
+        }
+        if let Some(crowd) = &self.crowd {
+            h.write_i64(-10);
+            crowd.hash(&mut h);
         }
         h.finish()
     }
@@ -503,6 +514,29 @@ impl Mission {
         checked.map_err(|(place, text)| GeometryError::Streets(place, text))
     }
 
+    /// Whether the event that it watches can be seen, sector by sector.
+    ///
+    /// # Errors
+    /// [`GeometryError::Crowd`] names the field and what is wrong.
+    pub fn check_crowd(&self) -> Result<(), GeometryError> {
+        let Some(crowd) = &self.crowd else {
+            return Ok(());
+        };
+        let wrong = |(field, text)| GeometryError::Crowd(field, text);
+        crowd.check().map_err(wrong)?;
+        let area = Polygon::new(self.area_m()).map_err(GeometryError::Area)?;
+        let half_mm = self.footprint_across_mm.min(self.footprint_along_mm);
+        let overlap_m = if self.task.is_area() {
+            2.0 * metres(self.footprint_across_mm) - self.lane_m()
+        } else {
+            let text =
+                "is watched by missions that cover an area: nobody flies past all of it else";
+            return Err(GeometryError::Crowd("area", text.to_owned()));
+        };
+        let checked = crowd.check_seen(&area, metres(half_mm), overlap_m);
+        checked.map_err(wrong)
+    }
+
     /// Derives the loop and the router.
     ///
     /// # Errors
@@ -513,6 +547,7 @@ impl Mission {
         self.check_counts()?;
         self.check_streets()?;
         self.check_layers().map_err(GeometryError::Layers)?;
+        self.check_crowd()?;
         if self.tasks.len() > BROUGHT_MAX || self.brought(false).len() < self.tasks.len() {
             let text = format!("at most {BROUGHT_MAX} fit, each as an operator may ask for it");
             return Err(GeometryError::Tasks(text));
@@ -756,6 +791,7 @@ mod tests {
             counts: Vec::new(),
             streets: None,
             layers: None,
+            crowd: None,
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,
@@ -921,7 +957,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 45] = [
+        let changes: [fn(&mut Mission); 47] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -983,6 +1019,12 @@ mod tests {
                 let mut layers = crate::layers::tests::three();
                 layers.slots += 1;
                 m.layers = Some(Arc::new(layers));
+            },
+            |m| m.crowd = Some(Arc::new(crate::crowd::tests::event())),
+            |m| {
+                let mut crowd = crate::crowd::tests::event();
+                crowd.dense_e2 += 1;
+                m.crowd = Some(Arc::new(crowd));
             },
             |m| m.counts.push(crossing(0)),
             |m| m.counts.push(crossing(1)),

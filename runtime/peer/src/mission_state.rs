@@ -139,6 +139,8 @@ pub(crate) struct MissionState {
     pub wind_mps: f64,
     /// Whether something that the mission looks for was told.
     pub detected: bool,
+    /// Whether a sector of the event that its mission watches is too dense.
+    pub too_dense: bool,
     /// Whether it lost the target that it follows.
     pub target_lost: bool,
     /// Whether everything is seen, and no task is open that somebody can do.
@@ -703,6 +705,7 @@ impl MissionState {
             lost: 0,
             wind_mps: 0.0,
             detected: false,
+            too_dense: false,
             target_lost: false,
             complete: false,
             stage: Stage::begun(

@@ -1,5 +1,6 @@
 //! What a peer wants done, and what it reports.
 
+use crate::gathering::CrowdAlert;
 use crate::offload::Job;
 use crate::task_desk::TaskHolder;
 use crate::why::BidHeard;
@@ -245,6 +246,12 @@ pub enum Report {
         id: TaskId,
         /// What, where and when.
         told: Detection,
+    },
+    /// A sector of the event that the mission watches became too dense, or has eased, as this peer
+    /// saw or was told.
+    Crowd {
+        /// Which, and how dense.
+        told: CrowdAlert,
     },
     /// What this peer knows of a contour has changed by much.
     Traced {

@@ -17,6 +17,7 @@ use crate::cooperation::{Cooperation, Situation};
 use crate::diary::Diary;
 use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::footprint::Footprint;
+use crate::gathering::{Crowd, Sector};
 use crate::hint::Hint;
 use crate::inbound::{self, Heard};
 use crate::input::{AskedTask, TaskEdit};
@@ -1024,7 +1025,20 @@ impl Peer {
         mission.map_or_else(Vec::new, |m| self.cooperation.tasking.hints(m))
     }
 
-    /// What is known of the sites of its mission and of its streets, for a person.
+    /// What all together saw of the event that its mission watches, as far as is known here; none
+    /// without one.
+    #[must_use]
+    pub fn crowd(&self) -> Option<Crowd> {
+        let mission = &self.cooperation.state()?.geometry.mission;
+        self.cooperation.tasking.crowd(mission)
+    }
+
+    /// What this UAV saw of it itself in this life, told or not, by sector.
+    pub fn own_crowd(&self) -> impl Iterator<Item = (u16, Sector)> {
+        self.cooperation.tasking.own_crowd()
+    }
+
+    /// What is known of the sites of its mission, of its streets and its event, for a person.
     fn counts_told(&self) -> Vec<String> {
         let Some(state) = self.cooperation.state() else {
             return Vec::new();
@@ -1036,6 +1050,7 @@ impl Peer {
         let hints = self.hints();
         told.extend(hints.iter().map(Hint::sentence));
         told.extend(self.usages().iter().flat_map(Usages::sentences));
+        told.extend(self.crowd().iter().flat_map(Crowd::sentences));
         told
     }
 

@@ -16,6 +16,7 @@
 //! | wind_above | it takes the wind for stronger; once it came to a state by that, until it is 1 m/s below |
 //! | plan_infeasible | cells are beyond everybody's fuel |
 //! | object_detected | something that its mission looks for was told in this sortie, and not withdrawn |
+//! | crowd_dense | a sector of the event that its mission watches was told to be too dense, and not to have eased |
 //! | target_lost | it had its target in sight, lost it, and said that it searches |
 //! | target_given | it holds a target to follow, and where that may be is near |
 //! | relay_given | it holds a relay position whose circle is planned |
@@ -216,6 +217,7 @@ impl MissionState {
             }
             MissionEvent::PlanInfeasible => self.cannot_fly_all(),
             MissionEvent::ObjectDetected => self.detected,
+            MissionEvent::CrowdDense => self.too_dense,
             MissionEvent::TargetLost => self.target_lost && self.followed_at_m().is_some(),
             MissionEvent::TargetGiven => self.followed_at_m().is_some(),
             MissionEvent::RelayGiven => self.relay_circle().is_some(),

@@ -22,6 +22,7 @@
 
 mod brought;
 mod counts;
+mod crowds;
 mod detecting;
 mod relaying;
 mod tracking;
@@ -34,6 +35,7 @@ use crate::counting::Counting;
 use crate::detections::Detections;
 use crate::effect::{Effect, Effects, PendingJob};
 use crate::errand::{Planned, Request};
+use crate::gathering::Gathering;
 use crate::input::Time;
 use crate::mission::mm;
 use crate::mission_state::{MissionState, RelayPosition, speed_mmps};
@@ -122,6 +124,8 @@ pub(crate) struct Tasking {
     pub(crate) counting: Counting,
     /// And how they saw its streets used.
     pub(crate) using: Using,
+    /// And who is where at the event that it watches.
+    pub(crate) gathering: Gathering,
     /// The version of the bundle that was spoken last.
     spoken: Option<Version>,
     /// The life in which the tasks of this peer's operator were spoken.
@@ -151,6 +155,7 @@ impl Tasking {
             detections: Detections::default(),
             counting: Counting::new(config.id.0),
             using: Using::new(config.id.0),
+            gathering: Gathering::new(config.id.0),
             spoken: None,
             told_in: 0,
             last_period: Time(0),
@@ -166,6 +171,7 @@ impl Tasking {
         self.detections.begin_life(me.incarnation);
         self.counting.begin_life(me.incarnation);
         self.using.begin_life(me.incarnation);
+        self.gathering.begin_life(me.incarnation);
         self.spoken = None;
         self.leave(state);
     }
@@ -236,6 +242,9 @@ impl Tasking {
         beliefs.loads.push(("counts", self.counting.len(), cap));
         let cap = crate::usage::KNOWN_MAX;
         beliefs.loads.push(("usages", self.using.len(), cap));
+        let cap = crate::gathering::KNOWN_MAX;
+        beliefs.loads.push(("sectors", self.gathering.len(), cap));
+        beliefs.crowd = self.gathering.followed().collect();
     }
 
     /// Whether anything is to be settled or flown.
@@ -264,6 +273,7 @@ impl Tasking {
                 self.using.hear(by, record.subject, usage);
                 Effects::new()
             }
+            Body::Crowd(tile) => self.gathering.hear(now, record.subject, tile),
             Body::Task(task) => {
                 let id = TaskId {
                     author: record.author,
@@ -347,6 +357,7 @@ impl Tasking {
     pub fn tick(&mut self, s: &Situation<'_>, order: Order, state: &mut MissionState) -> Effects {
         let sortie = state.geometry.mission.sortie;
         state.detected = self.detections.standing(sortie).next().is_some();
+        state.too_dense = self.gathering.dense().next().is_some();
         if s.role == Role::GroundStation {
             let keeps = |k: &Known| k.is_open() && !k.task.is_held();
             state.has_tasks = self.known.values().any(keeps);
@@ -355,6 +366,7 @@ impl Tasking {
             effects.extend(self.take_brought(s.now, mission, ended));
             effects.retain(|e| !matches!(e, Effect::Negotiate));
             effects.extend(self.tell_of_tasks(s));
+            effects.extend(self.tell_of_event(s, state));
             return effects;
         }
         let geometry = std::sync::Arc::clone(&state.geometry);
@@ -364,6 +376,7 @@ impl Tasking {
         } else {
             Effects::new()
         };
+        let asked = self.watch_event(s, state);
         let mut effects: Effects = self
             .expire(s.now)
             .iter()
@@ -374,6 +387,7 @@ impl Tasking {
             brought
                 .into_iter()
                 .chain(found)
+                .chain(asked)
                 .filter(|e| !matches!(e, Effect::Negotiate)),
         );
         if self.is_active() && s.speaks {

@@ -72,6 +72,7 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         counts: Vec::new(),
         streets: None,
         layers: None,
+        crowd: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,
@@ -180,6 +181,7 @@ impl Seat {
             traffic: skein_behaviors::traffic::Traffic::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
+            crowd: skein_behaviors::crowd::CrowdLook::default(),
             attitude: None,
         }
     }

@@ -66,6 +66,8 @@ pub enum Reason {
     Infeasible,
     /// What its mission looks for was told.
     Detected,
+    /// The event that its mission watches is too dense somewhere.
+    CrowdDense,
     /// It lost the target that it follows.
     TargetLost,
 }
@@ -87,6 +89,7 @@ impl Reason {
             MissionEvent::WindAbove => Self::Windy,
             MissionEvent::PlanInfeasible => Self::Infeasible,
             MissionEvent::ObjectDetected => Self::Detected,
+            MissionEvent::CrowdDense => Self::CrowdDense,
             MissionEvent::TargetLost => Self::TargetLost,
             MissionEvent::TargetGiven => Self::Track,
             MissionEvent::RelayGiven => Self::Relay,
@@ -118,6 +121,7 @@ impl Reason {
             Self::Windy => "the wind is stronger than its mission takes",
             Self::Infeasible => "a part of its mission cannot be flown",
             Self::Detected => "what its mission looks for was found",
+            Self::CrowdDense => "the event that its mission watches is too dense somewhere",
             Self::TargetLost => "it lost the target that it follows",
         }
     }

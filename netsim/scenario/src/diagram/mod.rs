@@ -132,12 +132,20 @@ pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Di
         "counts",
         "streets",
         "layers_m",
+        "crowd",
     ])?;
     let at = match f.get("diagram") {
         None if f.get("for_s").is_none()
-            && ["detections", "tasks", "counts", "streets", "layers_m"]
-                .iter()
-                .any(|name| f.get(name).is_some()) =>
+            && [
+                "detections",
+                "tasks",
+                "counts",
+                "streets",
+                "layers_m",
+                "crowd",
+            ]
+            .iter()
+            .any(|name| f.get(name).is_some()) =>
         {
             return Ok(None);
         }

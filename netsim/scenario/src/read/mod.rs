@@ -3,6 +3,7 @@
 
 pub(crate) mod contour;
 pub(crate) mod counts;
+pub(crate) mod crowd;
 pub(crate) mod detections;
 pub(crate) mod faults;
 pub(crate) mod fleet;
@@ -36,10 +37,13 @@ use skein_geometry::frame::Point;
 use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
-use skein_netsim::spec::{ContourSpec, GroundStationSpec, RadioSpec, StormSpec, VehicleSpec};
+use skein_netsim::spec::{
+    ContourSpec, CrowdSpec, GroundStationSpec, RadioSpec, StormSpec, VehicleSpec,
+};
 use skein_netsim::weather::Weather;
 use skein_peer::count_site::CountSite;
 use skein_peer::criteria::Criterion;
+use skein_peer::crowd::CrowdWatch;
 use skein_peer::diagram::Diagram;
 use skein_peer::input::NewTask;
 use skein_peer::streets::Streets;
@@ -80,6 +84,7 @@ const FIELDS: &[&str] = &[
     "operator",
     "vehicles",
     "contour",
+    "crowd",
     "storm",
     "checks",
 ];
@@ -106,6 +111,8 @@ pub(crate) struct Stated {
     pub(crate) streets: Option<Arc<Streets>>,
     /// Heights at each of which all is to be seen, metres; none where all is flown at one.
     pub(crate) layers_m: Vec<f64>,
+    /// The mass event that the mission watches.
+    pub(crate) crowd: Option<Arc<CrowdWatch>>,
     /// By what rule the loop is divided.
     pub(crate) division: Rule,
     pub(crate) lanes: Lanes,
@@ -125,6 +132,8 @@ pub(crate) struct Stated {
     pub(crate) vehicles: Vec<VehicleSpec>,
     /// A road or a fire that no peer knows.
     pub(crate) contour: Option<ContourSpec>,
+    /// The people of a mass event.
+    pub(crate) crowd_there: Option<CrowdSpec>,
     pub(crate) storm: StormSpec,
     /// What its files told besides what was asked, and faults that were left out.
     pub(crate) findings: Vec<Finding>,
@@ -208,6 +217,7 @@ pub(crate) fn scenario(
         layers_m: f.get("mission").map_or(Ok(Vec::new()), |node| {
             layers::of_mission(node, terrain.level_m)
         })?,
+        crowd: f.get("mission").map_or(Ok(None), crowd::of_mission)?,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f
@@ -229,6 +239,7 @@ pub(crate) fn scenario(
         operator,
         vehicles,
         contour: f.get("contour").map(contour::read).transpose()?,
+        crowd_there: f.get("crowd").map(crowd::read).transpose()?,
         findings,
         places,
     })

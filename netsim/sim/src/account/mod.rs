@@ -38,6 +38,7 @@ pub use work::Held;
 
 use crate::check::contours::ContourReport;
 use crate::check::counts::CountReport;
+use crate::check::crowds::CrowdReport;
 use crate::check::detections::DetectionReport;
 use crate::check::streets::StreetsReport;
 pub use crate::check::tracks::Tracked;
@@ -96,6 +97,7 @@ pub struct Account {
     contour: Option<ContourReport>,
     counts: Vec<CountReport>,
     streets: Option<StreetsReport>,
+    crowd: Option<CrowdReport>,
     found_ms: Option<u64>,
     over_ms: Option<u64>,
 }
@@ -122,6 +124,7 @@ impl Account {
             contour: None,
             counts: Vec::new(),
             streets: None,
+            crowd: None,
             found_ms: None,
             over_ms: None,
             setting,
@@ -155,6 +158,11 @@ impl Account {
     /// What is known so far of the sites at which the mission counts, beside what is true.
     pub fn counted(&mut self, reports: Vec<CountReport>) {
         self.counts = reports;
+    }
+
+    /// Who was told to be where at the event that the mission watches, beside what is true.
+    pub fn gathered(&mut self, report: Option<CrowdReport>) {
+        self.crowd = report;
     }
 
     /// How the streets of the mission are used, beside what is true.
@@ -302,6 +310,7 @@ impl Account {
                 None
             }
             Report::Detected { id, told } => (id.author == peer).then(|| told.sentence(id.author)),
+            Report::Crowd { told } => (told.look.by == peer).then(|| told.sentence()),
             Report::Round { .. } | Report::Revised { .. } | Report::Traced { .. } => None,
         }
     }
@@ -468,6 +477,7 @@ impl Account {
             counts: self.counts.clone(),
             streets: self.streets.clone(),
             layers: ending.judge.layers().into_iter().map(Into::into).collect(),
+            crowd: self.crowd.clone(),
             found_ms: self.found_ms,
             over_ms: self.over_ms,
             finished,

@@ -8,6 +8,7 @@ use super::lifetimes::Cause;
 use super::tasks::TaskReport;
 use crate::check::contours::ContourReport;
 use crate::check::counts::CountReport;
+use crate::check::crowds::CrowdReport;
 use crate::check::detections::DetectionReport;
 use crate::check::footprint::FootprintErrors;
 use crate::check::streets::StreetsReport;
@@ -106,6 +107,9 @@ pub struct RunReport {
     /// Each lap of a mission that is flown in layers: when all of it was seen from there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub layers: Vec<LayerReport>,
+    /// Who was told to be where at the event that the mission watches, beside what is true.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crowd: Option<CrowdReport>,
     /// Live UAVs at the end that believe the mission finished.
     pub finished: Vec<u16>,
     /// Live UAVs at the end that hold a relay position, with everything covered.

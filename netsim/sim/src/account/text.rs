@@ -3,6 +3,7 @@
 use super::lifetimes::Cause;
 use super::report::{Driver, KillReport, RestartReport, RunReport};
 use super::secs;
+use crate::check::crowds::CrowdReport;
 use crate::check::streets::StreetsReport;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -43,6 +44,9 @@ impl fmt::Display for RunReport {
         }
         for layer in &self.layers {
             writeln!(f, "  layer      {}", layer.line())?;
+        }
+        for line in self.crowd.iter().flat_map(CrowdReport::lines) {
+            writeln!(f, "  crowd      {line}")?;
         }
         self.write_radio(f)?;
         self.write_checks(f)?;

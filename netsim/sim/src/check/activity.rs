@@ -432,6 +432,9 @@ impl Facts<'_> {
             MissionEvent::WindAbove => self.is_windy(f64::from(amount) / 10.0),
             MissionEvent::PlanInfeasible => Holds::of(view.cannot_fly_all),
             MissionEvent::ObjectDetected => Holds::of(self.is_found()),
+            MissionEvent::CrowdDense => {
+                Holds::of(view.crowd.iter().any(|(_, s)| s.dense().is_some()))
+            }
             MissionEvent::TargetLost if view.relays => Holds::Maybe,
             MissionEvent::TargetLost => Holds::No,
             MissionEvent::TargetGiven | MissionEvent::RelayGiven if view.relays => Holds::Maybe,

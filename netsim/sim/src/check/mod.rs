@@ -27,6 +27,7 @@
 //! | [`wind`] | who estimates the wind is right |
 //! | [`contours`] | what is told of a contour is there, and who flies along one has it in its picture |
 //! | [`counts`] | what is counted at the sites of a mission is what truly passes and stands there |
+//! | [`crowds`] | people of a mass event are told to be where they are, and where they are too dense |
 //! | [`streets`] | how streets are used is told as it is, and hinted ways are quick |
 //! | [`detections`] | what a mission looks for and one had in sight is told, once, and is there |
 //! | [`spread`] | L3, L4 of every record, agreement on revision and order |
@@ -48,6 +49,7 @@ pub mod checker;
 pub mod contours;
 pub mod counts;
 pub mod cover;
+pub mod crowds;
 pub mod decision;
 pub mod detections;
 pub mod findings;

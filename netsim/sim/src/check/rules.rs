@@ -5,6 +5,7 @@ use super::airtime::AirtimeCheck;
 use super::cadence::CadenceCheck;
 use super::contours::{ContourCheck, Tracer};
 use super::counts::CountCheck;
+use super::crowds::CrowdCheck;
 use super::decision::{DecisionCheck, Mover};
 use super::detections::DetectionCheck;
 use super::flight::{FlightCheck, Flyer, at_base};
@@ -75,6 +76,8 @@ pub struct Rules {
     pub streets: StreetCheck,
     /// Whether each of its layers was seen.
     pub layers: LayerCheck,
+    /// Who is where at the event that it watches.
+    pub crowds: CrowdCheck,
     loops: BTreeMap<u16, u64>,
     twins: Twins,
     /// Where missions end, by the first revision that says so.
@@ -114,6 +117,7 @@ impl Rules {
             counts: CountCheck::default(),
             streets: StreetCheck::default(),
             layers: LayerCheck::default(),
+            crowds: CrowdCheck::default(),
             loops: BTreeMap::new(),
             twins: spec.twins(),
             bases: BTreeMap::new(),
@@ -130,6 +134,7 @@ impl Rules {
         self.detections.on_mission(mission);
         self.counts.on_mission(mission);
         self.streets.on_mission(mission);
+        self.crowds.on_mission(mission);
         self.spread
             .on_mission(chunks(mission).map_or(0, |pieces| pieces.len()));
     }
@@ -351,6 +356,7 @@ impl Rules {
         self.spoken.on_snapshot(snapshot, found);
         self.spread.on_snapshot(snapshot, found);
         self.tasks.on_snapshot(snapshot, found);
+        self.crowds.on_snapshot(snapshot, found);
         let flyers = (&self.flyers, &self.flight);
         self.relays.on_snapshot(snapshot, flyers, found);
         self.airtime.on_snapshot(snapshot, found);

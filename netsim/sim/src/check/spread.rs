@@ -78,7 +78,7 @@ fn limit_ms(snapshot: &Snapshot<'_>, bound_ms: u64, factor: u64, from_ms: u64) -
 }
 
 /// The same of what is counted on up to a tenth lost only.
-fn light_limit_ms(
+pub(super) fn light_limit_ms(
     snapshot: &Snapshot<'_>,
     bound_ms: u64,
     factor: u64,
@@ -95,11 +95,17 @@ fn record_ms(bounds: &Bounds, peers: usize) -> u64 {
     bounds.spread_ms() + crowd * bounds.interval_ms
 }
 
+/// How long a record may take to all of so many, and how often that where it is lost now and then.
+pub(super) fn record_limit(bounds: &Bounds, peers: usize) -> (u64, u64) {
+    (record_ms(bounds, peers), RECORD_FACTOR)
+}
+
 /// Whether a record reaches everybody: passed on, and worth it for longer than the two
 /// periods of a state, which is for people and is said again soon. Pieces of a mission reach
-/// who follows an older one: that is `agree`. Trails are said again in turn by their authors.
+/// who follows an older one: that is `agree`. Trails are said again in turn by their authors, and what is known of
+/// a mass event by whoever knows it: that is `crowd-agree`.
 fn spreads(kind: u8) -> bool {
-    let some = [Kind::State, Kind::Mission, Kind::Trail];
+    let some = [Kind::State, Kind::Mission, Kind::Trail, Kind::Crowd];
     Kind::of_number(kind).is_some_and(|k| k.relayed() && !some.contains(&k))
 }
 

@@ -22,6 +22,7 @@
 //! | [`latency`] | how long a peer takes to answer one input |
 
 mod air;
+mod crowd;
 mod fault_effects;
 mod judged_loop;
 pub mod latency;
@@ -445,6 +446,7 @@ impl Swarm {
         self.note_counts(idx);
         self.note_footprint(idx);
         self.note_streets(idx);
+        self.note_crowd(idx);
     }
 
     fn advance_world(&mut self) {
@@ -796,9 +798,11 @@ impl Swarm {
         self.meter.enter(before);
         self.account.reported(self.now_ms, id, &meant);
         self.note_voice(id, &report);
+        self.note_look_asked(id, peer, &report);
         self.note_task(id, &report);
         self.note_detection(id, &report);
         self.note_finished(id, &report);
+        self.note_alert(id, &report);
         if let Report::Refused { reason } = &report
             && !std::mem::take(&mut self.spoilt)
         {
@@ -837,6 +841,7 @@ impl Swarm {
                 .on_way_home(self.now_ms, &peers, self.judged.covered());
             return;
         }
+        self.judge_crowd();
         let loss_permille = self.air.loss_permille();
         self.checker.on_snapshot(
             self.now_ms,
@@ -1072,7 +1077,7 @@ impl Swarm {
         if self
             .air
             .judge()
-            .saw_task((task.number, *revision))
+            .saw_task(self.judged_as(*task, *revision))
             .is_none()
         {
             let text = format!("says that it saw the task {name:?}, and did not");

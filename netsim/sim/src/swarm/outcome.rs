@@ -67,6 +67,7 @@ impl Swarm {
         self.air.advance(self.now_ms);
         self.check_the_end();
         self.conclude_streets();
+        self.conclude_crowd();
         let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
         rules.counts.on_end(self.now_ms, found);
         for p in &self.peers {

@@ -60,6 +60,11 @@ impl Look {
         (is_recognised, off)
     }
 
+    /// How far off its UAV takes itself to be, metres.
+    pub fn displaced(&self) -> Vector {
+        self.displaced
+    }
+
     /// Where something is told to be that is so far off its place, with the error that is told:
     /// seen from there, from so high above it, metres.
     pub fn told(

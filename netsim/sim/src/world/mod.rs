@@ -7,6 +7,7 @@
 mod board;
 pub mod camera;
 pub mod contour;
+pub mod crowd;
 pub(crate) mod detector;
 pub mod fact;
 pub mod fixture;
@@ -35,6 +36,7 @@ pub use survey::{Cell, Survey, Uncoverable};
 use crate::spec::Spec;
 use crate::weather::Weather;
 use contour::Contour;
+use crowd::Crowd;
 use launcher::Launchers;
 use motion::{Kinematic, Piece};
 use skein_behaviors::traffic::{Sighting as Seen, Traffic};
@@ -158,6 +160,7 @@ pub struct World {
     weather: Weather,
     launchers: Option<Launchers>,
     contour: Option<Contour>,
+    crowd: Option<Crowd>,
     facts: Vec<Fact>,
     flown: Vec<Piece>,
     airborne: Vec<(u16, Place)>,
@@ -239,6 +242,10 @@ impl World {
             weather: spec.wind.clone(),
             launchers,
             contour: spec.contour.as_ref().map(|c| Contour::new(c, seed)),
+            crowd: spec
+                .crowd
+                .as_ref()
+                .map(|c| Crowd::new(c, spec.percept_period_ms, seed)),
             facts: Vec::new(),
             flown: Vec::new(),
             airborne: Vec::new(),
@@ -430,6 +437,9 @@ impl World {
             contour: self.contour.as_ref().map_or_else(Default::default, |c| {
                 c.look(body, uav, self.now_ms, &self.site.obstacles)
             }),
+            crowd: self.crowd.as_ref().map_or_else(Default::default, |c| {
+                c.look(body, uav, self.now_ms, &self.site.obstacles)
+            }),
             attitude,
             ..own
         })
@@ -449,6 +459,20 @@ impl World {
         both.map_or_else(Vec::new, |(c, body)| {
             c.pictured(body, self.now_ms, &self.site.obstacles)
         })
+    }
+
+    /// The people of a mass event, as they are.
+    #[must_use]
+    pub fn crowd(&self) -> Option<&Crowd> {
+        self.crowd.as_ref()
+    }
+
+    /// Whether nothing stands between a place on the ground and the camera of a UAV.
+    #[must_use]
+    pub fn is_open_to(&self, uav: u16, at: skein_geometry::frame::Point) -> bool {
+        let place = Place { at, height_m: 1.0 };
+        let body = self.body(uav);
+        body.is_some_and(|b| self.site.obstacles.sees(place_of(b), place))
     }
 
     /// The vehicles on the ground, as they are.
@@ -564,6 +588,9 @@ impl World {
                     u.body.take_wind(wind);
                 }
             }
+        }
+        if let Some(crowd) = &mut self.crowd {
+            crowd.advance(self.now_ms);
         }
     }
 

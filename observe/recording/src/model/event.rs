@@ -174,6 +174,25 @@ pub enum What {
         /// Whether it counts; else it was told before.
         stands: bool,
     },
+    /// A sector of a mass event became too dense, or has eased.
+    Crowd {
+        /// Who saw it first.
+        by: u16,
+        /// Where its middle is, metres east of the origin.
+        east_m: f64,
+        /// And north of it.
+        north_m: f64,
+        /// No farther from there than this, each way, metres.
+        error_m: f64,
+        /// People to a square metre.
+        per_m2: f64,
+        /// At least.
+        low_per_m2: f64,
+        /// And at most.
+        high_per_m2: f64,
+        /// Whether it is too dense; else it has eased.
+        dense: bool,
+    },
     /// What a peer knows of a contour has changed by much.
     Traced {
         /// Its length, metres.
@@ -232,6 +251,7 @@ impl What {
             Self::Revised { .. } => "revised",
             Self::Task { .. } => "task",
             Self::Detected { .. } => "detected",
+            Self::Crowd { .. } => "crowd",
             Self::Traced { .. } => "traced",
             Self::Silenced => "silenced",
             Self::Alarm => "alarm",

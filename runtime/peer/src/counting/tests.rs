@@ -74,6 +74,7 @@ impl Scene {
                 wind_north_mps: 0.0,
                 wind_unknown: false,
                 contour: skein_behaviors::contour::ContourLook::default(),
+                crowd: skein_behaviors::crowd::CrowdLook::default(),
                 attitude: None,
                 endurance_s: 3_000.0,
                 takes_off_in_ms: 0,

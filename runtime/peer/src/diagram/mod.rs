@@ -76,6 +76,8 @@ pub enum MissionEvent {
     PlanInfeasible,
     /// Something that its mission looks for was told, by itself or by another.
     ObjectDetected,
+    /// Somewhere the event that its mission watches is too dense.
+    CrowdDense,
     /// It lost the target that it follows, and searches for it.
     TargetLost,
     /// It was given a target to follow, and where that may be is near.
@@ -96,7 +98,7 @@ pub enum MissionEvent {
 
 impl MissionEvent {
     /// All, in the order of the default diagram.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::OperatorHold,
         Self::OperatorReturn,
         Self::MissionCancelled,
@@ -110,6 +112,7 @@ impl MissionEvent {
         Self::WindAbove,
         Self::PlanInfeasible,
         Self::ObjectDetected,
+        Self::CrowdDense,
         Self::TargetLost,
         Self::TargetGiven,
         Self::RelayGiven,
@@ -137,6 +140,7 @@ impl MissionEvent {
             Self::WindAbove => "wind_above",
             Self::PlanInfeasible => "plan_infeasible",
             Self::ObjectDetected => "object_detected",
+            Self::CrowdDense => "crowd_dense",
             Self::TargetLost => "target_lost",
             Self::TargetGiven => "target_given",
             Self::RelayGiven => "relay_given",

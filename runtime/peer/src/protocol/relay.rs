@@ -128,7 +128,7 @@ fn key_of(record: &Record) -> RecordKey {
 
 /// Whether a record is part of what a beacon tells of its author's records.
 fn is_counted(kind: Kind) -> bool {
-    kind.relayed() && !matches!(kind, Kind::Mission | Kind::Trail)
+    kind.relayed() && !matches!(kind, Kind::Mission | Kind::Trail | Kind::Crowd)
 }
 
 /// Of which mission a record is a piece.

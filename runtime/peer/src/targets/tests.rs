@@ -24,6 +24,7 @@ fn percept(now_ms: u64, at: Point, seen: &[(f64, f64, u8)]) -> Percept {
         pose: Pose::new(at, 0.0),
         sightings: Sightings::new(seen.iter().map(sighted)),
         contour: skein_behaviors::contour::ContourLook::default(),
+        crowd: skein_behaviors::crowd::CrowdLook::default(),
         attitude: None,
         height_m: 60.0,
         airspeed_mps: 13.0,

@@ -150,6 +150,7 @@ impl Tasking {
             self.detections.watch(now_ms, tracks);
         }
         self.count(percept, state);
+        self.gather(percept, state);
         let (Some(sought), Some(airframe)) = (self.sought(), self.flies) else {
             return false;
         };

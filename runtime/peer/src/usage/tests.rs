@@ -69,6 +69,7 @@ fn percept(time_ms: u64, at: Point) -> Percept {
         wind_unknown: false,
         attitude: None,
         contour: skein_behaviors::contour::ContourLook::default(),
+        crowd: skein_behaviors::crowd::CrowdLook::default(),
         endurance_s: 3_000.0,
         takes_off_in_ms: 0,
         launch_ready: false,

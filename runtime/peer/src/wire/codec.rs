@@ -12,6 +12,7 @@
 
 use super::cbor::{In, Listed, Out, Wire, array_of, in_field, number_of};
 use super::count::Count;
+use super::crowd::CrowdTile;
 use super::detection::Detection;
 use super::kinds::{Kind, RECORD_MAX_BYTES};
 use super::limits::{
@@ -101,6 +102,7 @@ pub enum Body {
     Trail(Trail),
     Count(Count),
     Usage(Usage),
+    Crowd(CrowdTile),
 }
 
 impl Body {
@@ -127,6 +129,7 @@ impl Body {
             Self::Trail(_) => Kind::Trail,
             Self::Count(_) => Kind::Count,
             Self::Usage(_) => Kind::Usage,
+            Self::Crowd(_) => Kind::Crowd,
         }
     }
 
@@ -164,6 +167,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Trail(b) => b.put(&mut out),
         Body::Count(b) => b.put(&mut out),
         Body::Usage(b) => b.put(&mut out),
+        Body::Crowd(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -200,6 +204,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Trail => Body::Trail(Wire::get(&mut input)?),
         Kind::Count => Body::Count(Wire::get(&mut input)?),
         Kind::Usage => Body::Usage(Wire::get(&mut input)?),
+        Kind::Crowd => Body::Crowd(Wire::get(&mut input)?),
         Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),

@@ -53,6 +53,8 @@ pub enum Kind {
     Count = 18,
     /// How the author saw streets of the mission used.
     Usage = 19,
+    /// The people of a mass event that the author saw.
+    Crowd = 20,
 }
 
 /// How long a record waiting to be sent matters.
@@ -110,7 +112,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 20] = [
+const TABLE: [KindRow; 21] = [
     KindRow {
         relayed: false,
         ..row(
@@ -300,11 +302,22 @@ const TABLE: [KindRow; 20] = [
             Lifetime::Ms(60_000),
         )
     },
+    // Where it is too dense somebody may be sent, and a later look says more.
+    KindRow {
+        subjects: super::crowd::TILES_MAX,
+        ..row(
+            Kind::Crowd,
+            "crowd",
+            640,
+            Priority::Telemetry,
+            Lifetime::Ms(60_000),
+        )
+    },
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -325,6 +338,7 @@ impl Kind {
         Self::Trail,
         Self::Count,
         Self::Usage,
+        Self::Crowd,
     ];
 
     /// Its number on the wire.
@@ -428,7 +442,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(20), None);
+        assert_eq!(Kind::of_number(21), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

@@ -83,6 +83,7 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
         Body::Trail(t) => super::trail::check(t),
         Body::Count(c) => super::count::check(c),
         Body::Usage(u) => super::usage::check(u),
+        Body::Crowd(t) => super::crowd::check(t),
     }
 }
 

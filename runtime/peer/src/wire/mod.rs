@@ -3,6 +3,7 @@
 pub(crate) mod cbor;
 pub mod codec;
 pub mod count;
+pub mod crowd;
 pub mod detection;
 mod intent;
 pub mod key;

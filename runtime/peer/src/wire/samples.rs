@@ -123,6 +123,10 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         Body::Usage(super::usage::samples::usage()),
         "831a1234567882861119072618d60018a30486131907260000000080",
     ));
+    all.push((
+        Body::Crowd(super::crowd::samples::tile()),
+        "841a1234567818518289021906681905c81906fe00021901360200890300000201000001008183021503",
+    ));
     all
 }
 
@@ -349,6 +353,7 @@ pub fn largest() -> Vec<Body> {
     all.extend(super::trail::samples::largest());
     all.extend(super::count::samples::largest());
     all.extend(super::usage::samples::largest());
+    all.extend(super::crowd::samples::largest());
     all
 }
 

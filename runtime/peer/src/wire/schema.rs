@@ -493,6 +493,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Trail => Some(super::trail::TRAIL),
         Kind::Count => Some(super::count::COUNT),
         Kind::Usage => Some(super::usage::USAGE),
+        Kind::Crowd => Some(super::crowd::CROWD),
         Kind::Event => None,
     }
 }

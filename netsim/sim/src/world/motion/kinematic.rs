@@ -300,6 +300,7 @@ impl Kinematic {
             traffic: skein_behaviors::traffic::Traffic::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
+            crowd: skein_behaviors::crowd::CrowdLook::default(),
             attitude: (!self.airframe.mount.is_level()).then(|| self.camera.attitude()),
         })
     }

@@ -1,6 +1,7 @@
 //! Bytes of all kinds: typical, largest, refused, cut short, changed.
 
 use super::super::count::Count;
+use super::super::crowd::{CrowdTile, Sure};
 use super::super::detection::Detection;
 use super::super::limits::*;
 use super::super::samples::{fresh, golden, gossip, largest, listing};
@@ -457,6 +458,29 @@ fn every_limit_is_sharp() {
                     with(&|u| u.turns.push(TurnUse::default()), "turns");
                 }
             }
+            Body::Crowd(t) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut CrowdTile), field| {
+                    let mut t = t.clone();
+                    change(&mut t);
+                    refused(&Body::Crowd(t), field);
+                };
+                with(&|t| t.rows.push(t.rows[15]), "rows");
+                with(&|t| t.dense.push(t.dense[15]), "dense");
+                with(&|t| t.time_s += 1, "time_s");
+                with(&|t| t.time_s = 5, "age_s");
+                with(&|t| t.rows[15].sector += 1, "sector");
+                with(&|t| t.rows[1].sector = 0, "rows");
+                with(&|t| t.rows[1].people -= 1, "low");
+                with(&|t| t.rows[1].high -= 1, "high");
+                with(&|t| t.rows[1].age_s += 1, "age_s");
+                with(&|t| t.rows[1].came -= 1, "came");
+                with(&|t| t.rows[1].sure = Sure::None, "sure_before_s");
+                with(&|t| t.rows[1].sure_before_s += 1, "sure_before_s");
+                with(&|t| t.rows[1].sure = Sure::Eased, "dense");
+                with(&|t| t.dense[1].sector = 0, "dense");
+                with(&|t| t.dense[1].dense_s += 1, "dense_s");
+            }
             Body::Count(c) => {
                 kinds += 1;
                 let with = |change: &dyn Fn(&mut Count), field| {
@@ -484,7 +508,7 @@ fn every_limit_is_sharp() {
             Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 19);
+    assert_eq!(kinds, 20);
 }
 
 #[test]
@@ -540,7 +564,7 @@ fn envelopes_beyond_the_table_are_refused() {
     };
     assert!(of(|_| ()).is_ok());
     assert_eq!(of(|r| r.kind = 8), Err(WireError::Kind { number: 8 }));
-    assert_eq!(of(|r| r.kind = 20), Err(WireError::Kind { number: 20 }));
+    assert_eq!(of(|r| r.kind = 21), Err(WireError::Kind { number: 21 }));
     assert_eq!(
         of(|r| r.subject = 1),
         Err(WireError::Range { field: "subject" })

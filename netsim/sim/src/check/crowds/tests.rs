@@ -1,0 +1,280 @@
+//! An event as it is told beside what is true, on scenes made by hand in which somebody lies.
+
+use super::*;
+use crate::check::testing::{Story, speaking};
+use crate::spec::{CrowdSpec, Field, GroupSpec};
+use skein_geometry::frame::Pose;
+use skein_peer::crowd::ThenWatch;
+use skein_peer::gathering::{Look, Verdict};
+
+/// Of the four by four sectors of 20 m the one about (50, 50) m.
+const SECTOR: u16 = 10;
+
+fn watch() -> CrowdWatch {
+    CrowdWatch {
+        west_m: 0,
+        south_m: 0,
+        sector_m: 20,
+        cols: 4,
+        rows: 4,
+        interval_s: 20,
+        dense_e2: 200,
+        eased_e2: 160,
+        then: ThenWatch::Notify,
+        look_every_s: 60,
+        worth: 100,
+    }
+}
+
+/// So many people in a square of 40 m about the sector, and a UAV over it that says what it likes.
+struct Scene {
+    check: CrowdCheck,
+    found: Findings,
+    people: People,
+    second: u64,
+    is_late: bool,
+}
+
+impl Scene {
+    fn new(people: u32) -> Self {
+        let mut mission = (*crate::world::fixture::square(1).mission).clone();
+        mission.crowd = Some(Arc::new(watch()));
+        let mut check = CrowdCheck::default();
+        check.on_mission(&mission);
+        check.able = [(1, 1_000)].into();
+        let group = GroupSpec {
+            people,
+            at: Field {
+                low: (30.0, 30.0),
+                high: (70.0, 70.0),
+            },
+            moves: Vec::new(),
+        };
+        let spec = CrowdSpec {
+            groups: vec![group],
+            ..CrowdSpec::default()
+        };
+        Self {
+            check,
+            found: Findings::new(0),
+            people: People::new(&spec, 200, 1),
+            second: 0,
+            is_late: false,
+        }
+    }
+
+    /// How many truly are in the sector.
+    fn truly(&self) -> u16 {
+        u16::try_from(self.people.within(Point::new(40.0, 40.0), 20.0)).unwrap()
+    }
+
+    /// A second later the UAV looks from there, and tells this of the sector, by a look of then
+    /// where it has one; whatever it tells, it has told.
+    fn look(&mut self, from: Point, says: Option<Sector>) {
+        self.look_untold(from, says, true);
+    }
+
+    fn look_untold(&mut self, from: Point, says: Option<Sector>, is_told: bool) {
+        self.second += 1;
+        self.people.advance(1_000 * self.second);
+        self.check.on_people(&self.people);
+        let own: Vec<(u16, Sector)> = says.map(|s| (SECTOR, s)).into_iter().collect();
+        let known = own.iter().copied().filter(|_| is_told).collect();
+        let known = Crowd::new(Arc::new(watch()), known);
+        let look = CrowdGlance {
+            uav: (1, 1),
+            picture: Picture::level(Pose::new(from, 0.0), (25.0, 25.0)),
+            is_late: self.is_late,
+            looks: true,
+            sees: &|_| true,
+            own: &own,
+            known: &known,
+        };
+        self.check
+            .on_look(1_000 * self.second, look, &mut self.found);
+    }
+
+    /// What an honest UAV says of so many by a look of the next second.
+    fn sector(&self, people: u16, is_dense: bool) -> Sector {
+        let at_ms = 1_000 * (self.second + 1);
+        Sector {
+            look: Some(Look {
+                seen_ms: at_ms,
+                by: 1,
+                people,
+                low: people - people / 10,
+                high: people + people / 10 + 2,
+                came: 0,
+            }),
+            verdict: Some(Verdict {
+                at_ms,
+                dense: is_dense.then_some((at_ms, 1)),
+            }),
+        }
+    }
+
+    fn broken(&self) -> Vec<&'static str> {
+        self.found.counts.keys().copied().collect()
+    }
+}
+
+fn over() -> Point {
+    Point::new(50.0, 50.0)
+}
+
+#[test]
+fn who_tells_the_truth_breaks_no_rule() {
+    for (people, is_dense) in [(6_400, true), (100, false)] {
+        let mut scene = Scene::new(people);
+        for _ in 0..80 {
+            let says = scene.sector(scene.truly(), is_dense);
+            scene.look(over(), Some(says));
+            scene.check.judge_look(SECTOR, &says);
+        }
+        scene.check.on_end(90_000, &mut scene.found);
+        assert_eq!(scene.broken(), [""; 0], "{:?}", scene.found.violations);
+        assert_eq!(scene.check.report().unwrap().ranges, (80, 80));
+    }
+}
+
+#[test]
+fn who_says_that_it_saw_what_is_not_in_its_picture_is_found() {
+    let mut scene = Scene::new(100);
+    let says = scene.sector(scene.truly(), false);
+    scene.look(Point::new(90.0, 50.0), Some(says));
+    assert_eq!(scene.broken(), ["crowd-sight"]);
+    let mut late = Scene::new(100);
+    late.is_late = true;
+    let says = late.sector(late.truly(), false);
+    late.look(Point::new(90.0, 50.0), Some(says));
+    assert_eq!(late.broken(), [""; 0]);
+}
+
+#[test]
+fn who_looks_and_counts_nobody_is_found() {
+    let mut scene = Scene::new(100);
+    for _ in 0..5 {
+        scene.look(over(), None);
+    }
+    assert_eq!(scene.broken(), ["crowd-idle"]);
+    // Nobody asks that of who does not fly the mission.
+    let mut scene = Scene::new(100);
+    scene.check.able.clear();
+    for _ in 0..5 {
+        scene.look(over(), None);
+    }
+    assert_eq!(scene.broken(), [""; 0]);
+}
+
+#[test]
+fn who_does_not_know_what_it_sees_to_be_too_dense_is_found() {
+    for (people, says_dense) in [(6_400, false), (100, true)] {
+        let mut scene = Scene::new(people);
+        for _ in 0..5 {
+            let says = scene.sector(scene.truly(), says_dense);
+            scene.look(over(), Some(says));
+        }
+        assert_eq!(scene.broken(), ["crowd-norm"]);
+    }
+    // What is near to the norm may be either.
+    for says_dense in [false, true] {
+        let mut scene = Scene::new(3_200);
+        for _ in 0..5 {
+            let says = scene.sector(scene.truly(), says_dense);
+            scene.look(over(), Some(says));
+        }
+        assert_eq!(scene.broken(), [""; 0]);
+    }
+}
+
+#[test]
+fn who_keeps_to_itself_that_it_is_too_dense_is_found() {
+    let mut scene = Scene::new(6_400);
+    for _ in 0..16 {
+        let says = scene.sector(scene.truly(), true);
+        scene.look_untold(over(), Some(says), false);
+    }
+    assert_eq!(scene.broken(), [""; 0]);
+    for _ in 0..4 {
+        let says = scene.sector(scene.truly(), true);
+        scene.look_untold(over(), Some(says), false);
+    }
+    assert_eq!(scene.broken(), ["crowd-late"]);
+}
+
+#[test]
+fn an_alarm_where_nothing_is_near_to_it_is_found_and_so_is_an_end_that_is_none() {
+    let told = |is_dense| CrowdAlert {
+        sector: SECTOR,
+        is_dense,
+        since_ms: 1_000,
+        by: 1,
+        sector_m: 20,
+        ..CrowdAlert::default()
+    };
+    for (people, is_dense, wrong) in [
+        (100, true, true),
+        (100, false, false),
+        (6_400, true, false),
+        (6_400, false, true),
+    ] {
+        let mut scene = Scene::new(people);
+        scene.look(over(), None);
+        let at = (1_500, 1, false);
+        scene.check.on_told(at, &told(is_dense), &mut scene.found);
+        assert_eq!(
+            scene.broken() == ["crowd-false"],
+            wrong,
+            "{people} {is_dense}"
+        );
+    }
+}
+
+#[test]
+fn ranges_that_do_not_hold_are_found_and_so_are_wrong_sums() {
+    let mut scene = Scene::new(100);
+    for k in 0..80 {
+        let people = if k % 4 == 0 { 90 } else { scene.truly() };
+        let says = scene.sector(people, false);
+        scene.look(over(), Some(says));
+        scene.check.judge_look(SECTOR, &says);
+        let all = watch().sectors().map(|n| (n, says)).collect();
+        let known = Crowd::new(Arc::new(watch()), all);
+        scene.check.judge_people(30_000 * (k + 1), &known);
+    }
+    scene.check.on_end(90_000, &mut scene.found);
+    assert_eq!(scene.broken(), ["crowd-people", "crowd-range"]);
+}
+
+#[test]
+fn who_lacks_for_long_what_its_component_was_told_is_found() {
+    let mut scene = Scene::new(100);
+    let says = scene.sector(30, false);
+    let mut story = Story::new(0);
+    let knows = |sectors: Vec<(u16, Sector)>| skein_peer::Beliefs {
+        crowd: sectors,
+        ..speaking()
+    };
+    scene.check.revision = 1;
+    let run = |scene: &mut Scene, story: &mut Story, from_s: u64, to_s: u64, second: bool| {
+        for s in from_s..to_s {
+            let other = if second {
+                vec![(SECTOR, says)]
+            } else {
+                Vec::new()
+            };
+            let views = [(1, knows(vec![(SECTOR, says)])), (2, knows(other))];
+            story.snapshot(1_000 * s, &views, |snapshot| {
+                scene.check.on_snapshot(snapshot, &mut scene.found);
+            });
+        }
+    };
+    run(&mut scene, &mut story, 0, 150, false);
+    assert_eq!(scene.broken(), [""; 0]);
+    run(&mut scene, &mut story, 150, 300, false);
+    assert_eq!(scene.broken(), ["crowd-agree"]);
+    let mut scene = Scene::new(100);
+    scene.check.revision = 1;
+    run(&mut scene, &mut Story::new(0), 0, 300, true);
+    assert_eq!(scene.broken(), [""; 0]);
+}
