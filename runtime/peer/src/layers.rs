@@ -226,6 +226,7 @@ impl Mission {
             ("detections", !self.detections.is_empty()),
             ("counts", !self.counts.is_empty()),
             ("streets", self.streets.is_some()),
+            ("crowds", self.crowd.is_some()),
         ];
         if let Some((what, _)) = looks.iter().find(|(_, asked)| *asked) {
             return Err(format!(

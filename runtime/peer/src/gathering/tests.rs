@@ -92,6 +92,7 @@ fn percept(time_ms: u64) -> Percept {
         crowd: CrowdLook::default(),
         endurance_s: 3_000.0,
         takes_off_in_ms: 0,
+        launch_ready: false,
         failsafe: false,
         traffic: skein_behaviors::traffic::Traffic::default(),
         sightings: skein_behaviors::sightings::Sightings::default(),

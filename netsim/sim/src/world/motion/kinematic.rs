@@ -536,6 +536,7 @@ mod tests {
         let mut k = fresh();
         let mut flown = Vec::new();
         let up = Setpoint {
+            launch: skein_behaviors::Launch::Stay,
             from_ms: 0,
             airspeed_mps: 13.0,
             height_m: 51.0,
