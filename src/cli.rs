@@ -5,6 +5,7 @@ use crate::chaos::ChaosArgs;
 use crate::check::CheckArgs;
 use crate::console::OrderArgs;
 use crate::export::ExportArgs;
+use crate::hint::{self, HintArgs};
 use crate::mission::MissionArgs;
 use crate::nfz::NfzArgs;
 use crate::observe::ObserveArgs;
@@ -90,6 +91,8 @@ pub enum Verb {
     Nfz(NfzArgs),
     /// Asks for tasks in flight and cancels them, at a ground station's console.
     Task(TaskArgs),
+    /// The quickest way along the mission's streets, at a ground station's console.
+    Hint(HintArgs),
     /// What a peer does and why, at its console.
     Why(WhyArgs),
     /// Draws a map of a running swarm, from what it says on the air.
@@ -144,6 +147,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Verb::Mission(args) => mission::run(args),
         Verb::Nfz(args) => nfz::run(args),
         Verb::Task(args) => task::run(args),
+        Verb::Hint(args) => hint::run(args),
         Verb::Why(args) => why::run(args),
         Verb::Watch(args) => watch::run(args),
         Verb::Replay(args) => replay::run(args),

@@ -10,6 +10,7 @@ mod cli;
 mod console;
 mod exit;
 mod export;
+mod hint;
 mod log;
 mod mission;
 mod nfz;

@@ -226,6 +226,10 @@ fn a_uav_says_why(place: &Place) {
     );
     let (code, said) = place.skein(&["why", "77"]);
     assert!(code == 4 && said.contains("no peer 77"), "{said}");
+    let (code, said) = place.skein(&["hint", "60.165,24.935", "60.166,24.936"]);
+    assert!(code == 3 && said.contains("brings no streets"), "{said}");
+    let (code, said) = place.skein(&["hint", "60.165,24.935", "10.166,24.936"]);
+    assert!(code == 3 && said.contains("km from the origin"), "{said}");
     let console = place.entry()["consoles"]["2"].clone();
     let at = console["at"].as_str().unwrap();
     let token_file = console["token_file"].as_str().unwrap();

@@ -36,6 +36,10 @@ pub enum Command {
     /// What the ground station knows of the mission: one line of JSON, an
     /// [`Overview`](skein_peer::Overview).
     Show,
+    /// The quickest way along the mission's streets between two places, millimetres from its
+    /// origin, by what the ground station knows now: one line of JSON, a
+    /// [`WayHint`](skein_peer::hint::WayHint).
+    Hint(PointMm, PointMm),
     /// What this peer does and why: one line of JSON, a [`Why`](skein_peer::Why).
     Why,
 }

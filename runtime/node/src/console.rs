@@ -145,6 +145,7 @@ pub fn edited(request: Command, newest: Option<&Mission>) -> Result<Mission, Str
         | Command::OrderOne(..)
         | Command::Task(_)
         | Command::Show
+        | Command::Hint(..)
         | Command::Why => {
             return Err("no mission follows from that".to_owned());
         }

@@ -21,6 +21,7 @@ use skein_behaviors::order::SINGLES_MAX;
 use skein_behaviors::{Order, Orders, Percept};
 use skein_console::{Answer, Asked, Command as Request};
 use skein_peer::input::{AskedTask, TaskEdit};
+use skein_peer::mission::PointMm;
 use skein_peer::offload::{Job, JobResult, run};
 use skein_peer::{Command, Incarnation, Input, Mission, Output, Peer, Time, Transmission};
 use std::sync::Arc;
@@ -62,6 +63,8 @@ pub trait PeerLogic: Send {
     fn why(&self) -> String;
     /// What it knows of the mission, as JSON; none without a mission.
     fn overview(&self) -> Option<String>;
+    /// The quickest way between two places, as a line of JSON; a sentence where there is none.
+    fn way(&self, from: PointMm, to: PointMm) -> Result<String, String>;
     /// Whether the operator's words on tasks can be carried out; a sentence that says why not.
     fn check_task(&self, edit: &TaskEdit) -> Result<(), String>;
     /// The tasks of its operator.
@@ -114,6 +117,11 @@ impl PeerLogic for Peer {
 
     fn overview(&self) -> Option<String> {
         serde_json::to_string(&Peer::overview(self)?).ok()
+    }
+
+    fn way(&self, from: PointMm, to: PointMm) -> Result<String, String> {
+        let way = Peer::way(self, from, to).map_err(|e| e.to_string())?;
+        serde_json::to_string(&way).map_err(|e| e.to_string())
     }
 
     fn check_task(&self, edit: &TaskEdit) -> Result<(), String> {
@@ -447,6 +455,7 @@ where
                         .ok_or_else(nothing),
                 )
             }
+            Request::Hint(from, to) => Some(self.peer.way(*from, *to).map(|line| vec![line])),
             Request::Order(order) => Some(self.order(None, *order).await),
             Request::OrderOne(uav, order) => Some(self.order(Some(*uav), *order).await),
             Request::Task(edit) => Some(self.task(edit.clone()).await),

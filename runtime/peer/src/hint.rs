@@ -6,10 +6,12 @@
 //! `PRIOR_S` of one vehicle at the usual speed. Where vehicles are seen to stand, on and on, a
 //! stretch is blocked: it is driven only where there is no other way.
 
+use crate::mission::{PointMm, mm};
 use crate::usage::{StretchSum, Usages};
 use serde::{Deserialize, Serialize};
 use skein_flight::streets::quickest::Leg;
 use skein_geometry::frame::Point;
+use thiserror::Error;
 
 /// The usual speed counts as one vehicle that was watched for so long, seconds.
 const PRIOR_S: f64 = 10.0;
@@ -70,7 +72,50 @@ pub struct Hint {
     pub is_blocked: bool,
 }
 
+/// A way that somebody asks for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WayHint {
+    /// The way, by what is known now.
+    pub hint: Hint,
+    /// Its line, millimetres from the mission's origin: from where on the streets it begins to
+    /// where it ends.
+    pub line: Vec<PointMm>,
+    /// How far from these the places are that it was asked for between, metres.
+    pub off_m: (f64, f64),
+}
+
+/// Why there is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum NoWay {
+    /// No mission is held, or nothing followed from it yet.
+    #[error("no mission is held here yet")]
+    Mission,
+    /// Nobody was told of streets.
+    #[error("the mission brings no streets (mission.streets)")]
+    Streets,
+    /// There is none.
+    #[error("the mission's streets do not lead from there to there")]
+    Apart,
+}
+
 impl Usages {
+    /// The quickest way from a place to a place, metres, with its line.
+    ///
+    /// # Errors
+    /// When the streets do not lead there.
+    pub fn way(&self, from: Point, to: Point) -> Result<WayHint, NoWay> {
+        let hint = self.hint("asked for", from, to).ok_or(NoWay::Apart)?;
+        let leg = |&(edge, from_m, to_m): &(u16, f64, f64)| Leg { edge, from_m, to_m };
+        let legs: Vec<Leg> = hint.legs.iter().map(leg).collect();
+        let line = self.network().line(&legs);
+        let off_m = |place: Point, on: Option<&Point>| on.map_or(0.0, |on| (place - on).norm());
+        Ok(WayHint {
+            off_m: (off_m(from, line.first()), off_m(to, line.last())),
+            line: line.iter().map(|p| (mm(p.x), mm(p.y))).collect(),
+            hint,
+        })
+    }
+
     /// What is known of how a stretch is driven.
     #[must_use]
     pub fn pace(&self, stretch: u16) -> Pace {
@@ -244,5 +289,16 @@ mod tests {
         assert!((hint.length_m - 60.0).abs() < 1e-6);
         let far = Point::new(5_000.0, 0.0);
         assert!(usages.hint("far", from, far).is_none());
+        assert_eq!(usages.way(from, far), Err(NoWay::Apart));
+    }
+
+    #[test]
+    fn a_way_that_is_asked_for_has_its_line_and_how_far_off_it_begins() {
+        let (usages, _) = seen(0, 900);
+        let (from, to) = (Point::new(60.0, 103.0), Point::new(120.0, 100.0));
+        let way = usages.way(from, to).unwrap();
+        assert_eq!(way.line, [(60_000, 100_000), (120_000, 100_000)]);
+        assert!((way.off_m.0 - 3.0).abs() < 1e-9 && way.off_m.1 < 1e-9);
+        assert!((way.hint.length_m - 60.0).abs() < 1e-6);
     }
 }

@@ -18,11 +18,12 @@ use crate::diary::Diary;
 use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::footprint::Footprint;
 use crate::gathering::{Crowd, Sector};
-use crate::hint::Hint;
+use crate::hint::{Hint, NoWay, WayHint};
 use crate::inbound::{self, Heard};
 use crate::input::{AskedTask, TaskEdit};
 use crate::input::{Command, Input, Time};
 use crate::journal::{Durable, Entry};
+use crate::mission::{PointMm, point_m};
 use crate::offload::{Job, JobResult};
 use crate::outbound::{self, Outbound, Sources};
 use crate::output::{Output, Report, Status};
@@ -1023,6 +1024,17 @@ impl Peer {
         let state = self.cooperation.state();
         let mission = state.map(|s| &s.geometry.mission);
         mission.map_or_else(Vec::new, |m| self.cooperation.tasking.hints(m))
+    }
+
+    /// The quickest way along the streets of its mission from a place to a place, mm, by what
+    /// is known now.
+    ///
+    /// # Errors
+    /// When no mission is held, it brings no streets, or these do not lead there.
+    pub fn way(&self, from: PointMm, to: PointMm) -> Result<WayHint, NoWay> {
+        self.cooperation.state().ok_or(NoWay::Mission)?;
+        let usages = self.usages().ok_or(NoWay::Streets)?;
+        usages.way(point_m(from), point_m(to))
     }
 
     /// What all together saw of the event that its mission watches, as far as is known here; none

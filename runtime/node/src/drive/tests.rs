@@ -127,6 +127,10 @@ impl PeerLogic for Double {
         None
     }
 
+    fn way(&self, from: PointMm, to: PointMm) -> Result<String, String> {
+        Err(format!("no way from {from:?} to {to:?}"))
+    }
+
     fn check_task(&self, _: &TaskEdit) -> Result<(), String> {
         Ok(())
     }
