@@ -7,12 +7,14 @@
 //! | event | what follows |
 //! |---|---|
 //! | a percept of a UAV that is not where it was to be | a circle from there is imposed, and said |
+//! | it stands ready to be launched | nothing is in force; its first flight is asked for, where none is clear for long by pleading |
 //! | what was offered is agreed | it is flown |
 //! | the goal does not lead where the offer does | the offer is withdrawn |
 //! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after a second |
 //! | one who goes before is held up by this UAV, which gets no further itself, or anybody by one with nothing to do | a way aside is offered that lets them pass |
 //! | another UAV is believed down, for so long that it would have circled | it is in nobody's way |
 
+mod line;
 mod passing;
 
 use crate::effect::{Effect, Effects};
@@ -22,6 +24,7 @@ use crate::protocol::promises::Brief;
 use crate::wire::codec::Body;
 use crate::wire::message::{Member, Record};
 use crate::{Incarnation, PeerId};
+use line::Line;
 use passing::{Gist, Passing};
 use skein_behaviors::executive::promised::{Extension, PROMISED_MOST_S};
 use skein_behaviors::traffic::Sighting;
@@ -48,14 +51,6 @@ const SAY_AGAIN_MS: u64 = 900;
 /// What asks for nothing is said again with its motions after so long, milliseconds: who
 /// comes into earshot learns of it before the two can meet.
 const SAY_MS: u64 = 5_000;
-
-/// Who stands on a launcher without a clear way shows others what they hold up after so long,
-/// milliseconds: by then who has somewhere to go is gone.
-const HELD_UP_MS: u64 = 5_000;
-
-/// And again after so long, milliseconds: who makes room needs an exchange of messages and some
-/// seconds of flight.
-const PLEAD_AGAIN_MS: u64 = 10_000;
 
 /// Two statements are at least so far apart, milliseconds.
 const SAY_LEAST_MS: u64 = 200;
@@ -101,36 +96,6 @@ pub(crate) struct Separation {
     down_since: BTreeMap<u16, Time>,
     passing: Passing,
     line: Line,
-}
-
-/// How long it has stood without a clear way.
-#[derive(Clone, Copy, Debug, Default)]
-struct Line {
-    held_up_since_ms: Option<u64>,
-    pleaded_ms: Option<u64>,
-}
-
-impl Line {
-    /// Whether others are to be shown what they hold up.
-    fn is_due(self, now_ms: u64) -> bool {
-        let long_ms = self.held_up_since_ms.map_or(0, |since| now_ms - since);
-        let lately = self
-            .pleaded_ms
-            .is_some_and(|at| now_ms < at + PLEAD_AGAIN_MS);
-        long_ms >= HELD_UP_MS && !lately
-    }
-
-    /// It has looked for a way from where it stands.
-    fn looked(&mut self, now_ms: u64, is_clear: bool, offers: bool) {
-        if is_clear {
-            *self = Self::default();
-            return;
-        }
-        self.held_up_since_ms.get_or_insert(now_ms);
-        if offers {
-            self.pleaded_ms = Some(now_ms);
-        }
-    }
 }
 
 impl Separation {

@@ -121,32 +121,22 @@ fn flown(scenario: Result<crate::Scenario, ScenarioError>) -> Result<Diagram, Sc
     Ok(scenario?.spec.mission.flown_by().into_owned())
 }
 
+/// What a mission may bring, also to the default diagram.
+const BRINGS: [&str; 6] = [
+    "detections",
+    "tasks",
+    "counts",
+    "streets",
+    "layers_m",
+    "crowd",
+];
+
 /// What a scenario says of its mission: the diagram that it is flown by, where it names one or
 /// brings its own; none where that is the default one.
 pub(crate) fn of_mission(node: &Node<'_>, files: &Files<'_>) -> Result<Option<Diagram>, Error> {
-    let f = node.fields(&[
-        "diagram",
-        "for_s",
-        "detections",
-        "tasks",
-        "counts",
-        "streets",
-        "layers_m",
-        "crowd",
-    ])?;
+    let f = node.fields(&[&["diagram", "for_s"], &BRINGS[..]].concat())?;
     let at = match f.get("diagram") {
-        None if f.get("for_s").is_none()
-            && [
-                "detections",
-                "tasks",
-                "counts",
-                "streets",
-                "layers_m",
-                "crowd",
-            ]
-            .iter()
-            .any(|name| f.get(name).is_some()) =>
-        {
+        None if f.get("for_s").is_none() && BRINGS.iter().any(|name| f.get(name).is_some()) => {
             return Ok(None);
         }
         _ => f.need("diagram", "\"patrol\"")?,
