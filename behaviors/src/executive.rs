@@ -407,14 +407,14 @@ impl Executive {
 
     /// Before it takes off: it sees nothing, and plans from where it stands once it flies.
     fn on_ground(&mut self, percept: &Percept) -> Setpoint {
-        if let Some(setpoint) = self.on_launcher(percept) {
-            return setpoint;
-        }
-        self.replan = true;
-        self.requeue();
-        let setpoint = self
-            .envelope
-            .check(percept, self.setpoint(percept, Vec::new()));
+        let bare = self.setpoint(percept, Vec::new());
+        let setpoint = if let Some(launch) = self.on_launcher(percept) {
+            Setpoint { launch, ..bare }
+        } else {
+            self.replan = true;
+            self.requeue();
+            self.envelope.check(percept, bare)
+        };
         self.played = Some(Played {
             percept: *percept,
             steps: Vec::new(),

@@ -54,6 +54,13 @@ impl Fingerprint {
     }
 }
 
+/// Half of a hash, of which both halves are a part.
+#[must_use]
+#[allow(clippy::cast_possible_truncation, reason = "half of a hash is wanted")]
+pub fn folded(hash: u64) -> u32 {
+    (hash ^ hash >> 32) as u32
+}
+
 /// FNV-1a, 64 bit (Fowler, Noll and Vo, 1991): small and stable.
 #[derive(Clone, Copy, Debug)]
 pub struct Fnv(u64);

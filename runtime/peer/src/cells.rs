@@ -7,7 +7,7 @@
 
 use crate::varint;
 use crate::wire::message::CellRun;
-use skein_geometry::hash::Fnv;
+use skein_geometry::hash::{Fnv, folded};
 
 /// Why run lengths were refused; nothing was decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -251,8 +251,7 @@ impl CellSet {
         for word in &self.words {
             h.write(&word.to_le_bytes());
         }
-        let folded = (h.finish() >> 32) ^ (h.finish() & u64::from(u32::MAX));
-        u32::try_from(folded).unwrap_or(u32::MAX)
+        folded(h.finish())
     }
 
     /// The longest runs of consecutive cells, ascending; no run crosses the seam

@@ -35,7 +35,7 @@ use skein_flight::airframe::Airframe;
 use skein_flight::tracking::tracks::{TargetName, Track, Tracks};
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Pose};
-use skein_geometry::hash::Fnv;
+use skein_geometry::hash::{Fnv, folded};
 use skein_geometry::math::seconds;
 use std::collections::BTreeMap;
 
@@ -258,10 +258,7 @@ impl Mission {
         let mut h = Fnv::new();
         h.write_i64(i64::from(self.sortie));
         self.counts.iter().for_each(|s| s.hash(&mut h));
-        let hash = h.finish();
-        #[allow(clippy::cast_possible_truncation, reason = "half of a hash is one")]
-        let half = (hash ^ hash >> 32) as u32;
-        half
+        folded(h.finish())
     }
 }
 

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use skein_behaviors::crowd::{SQUARE_M, Square};
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Vector};
-use skein_geometry::hash::Fnv;
+use skein_geometry::hash::{Fnv, folded};
 
 /// Sectors are made of whole squares, metres.
 const SQUARE: u16 = 10;
@@ -322,10 +322,7 @@ impl Mission {
         if let Some(crowd) = &self.crowd {
             crowd.hash(&mut h);
         }
-        let hash = h.finish();
-        #[allow(clippy::cast_possible_truncation, reason = "half of a hash is one")]
-        let half = (hash ^ hash >> 32) as u32;
-        half
+        folded(h.finish())
     }
 }
 

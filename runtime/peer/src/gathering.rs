@@ -185,13 +185,8 @@ impl Gathering {
         let now_ms = percept.time_ms / 1_000 * 1_000;
         self.last_ms = now_ms;
         let view = View::of(percept, airframe);
-        let certain_rad = if airframe.mount.is_level() {
-            0.0
-        } else {
-            DIRECTION_OFF_RAD
-        };
         let squares = percept.crowd.seen().iter();
-        let certain = squares.filter(|s| view.holds(&s.corners(), 0.0, certain_rad));
+        let certain = squares.filter(|s| view.holds(&s.corners(), 0.0, DIRECTION_OFF_RAD));
         let picture = Picture::new(certain);
         let Some((low, high)) = picture.bounds() else {
             return;

@@ -277,12 +277,13 @@ impl Separation {
         let wants = executive.wants_more(now_ms);
         if wants {
             let mut ways = executive.extensions(now_ms, lead_ms, is_open);
-            let offers = ways.iter().map(|e| (&e.plan, until(e)));
-            let clear = conflicts.offer(now_ms, offers, None);
+            let offers = || ways.iter().map(|e| (&e.plan, until(e)));
+            let clear = conflicts.offer(now_ms, offers(), None);
             let nth = if executive.stands() {
-                let offers = ways.iter().map(|e| (&e.plan, until(e)));
-                let pleads = clear.is_none() && self.line.is_due(now_ms);
-                let nth = clear.or_else(|| conflicts.plead(now_ms, offers.filter(|_| pleads)));
+                let nth = match clear {
+                    None if self.line.is_due(now_ms) => conflicts.plead(now_ms, offers()),
+                    clear => clear,
+                };
                 self.line.looked(now_ms, clear.is_some(), nth.is_some());
                 executive.is_held_up(nth.is_none());
                 nth

@@ -59,7 +59,7 @@ pub(crate) use relaying::KEPT_FOR_COVER;
 use skein_behaviors::executive::detour::Watched;
 use skein_behaviors::{Order, Percept};
 use skein_flight::airframe::Airframe;
-use skein_geometry::hash::Fnv;
+use skein_geometry::hash::{Fnv, folded};
 use skein_geometry::math::wrap_pi;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher};
@@ -804,6 +804,5 @@ fn map_of(state: &MissionState) -> u32 {
     let mut hash = Fnv::new();
     (&mission.zones, &mission.added_zones).hash(&mut hash);
     (mission.turn_radius_mm, mission.clearance_mm).hash(&mut hash);
-    let hash = Hasher::finish(&hash);
-    u32::try_from((hash ^ hash >> 32) & 0xffff_ffff).unwrap_or(0)
+    folded(Hasher::finish(&hash))
 }

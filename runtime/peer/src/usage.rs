@@ -36,7 +36,7 @@ use skein_flight::airframe::Airframe;
 use skein_flight::streets::{Network, Turn};
 use skein_flight::tracking::tracks::{TargetName, Track, Tracks};
 use skein_geometry::frame::{Point, Pose, Vector};
-use skein_geometry::hash::Fnv;
+use skein_geometry::hash::{Fnv, folded};
 use skein_geometry::math::seconds;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -121,10 +121,7 @@ impl Mission {
         if let Some(streets) = &self.streets {
             streets.hash_ways(&mut h);
         }
-        let hash = h.finish();
-        #[allow(clippy::cast_possible_truncation, reason = "half of a hash is one")]
-        let half = (hash ^ hash >> 32) as u32;
-        half
+        folded(h.finish())
     }
 }
 

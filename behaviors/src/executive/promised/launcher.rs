@@ -12,10 +12,10 @@
 //! | agreed | before its time | when it takes off |
 //! | agreed | its time is past, it is on the ground still | as in the line: it asks anew |
 
-use super::super::{Executive, Played};
+use super::super::Executive;
 use super::Contingency;
 use crate::percept::Percept;
-use crate::setpoint::{Launch, Setpoint};
+use crate::setpoint::Launch;
 use skein_geometry::frame::Pose;
 
 impl Executive {
@@ -44,31 +44,20 @@ impl Executive {
     }
 
     /// What its airframe is told on the ground, if it flies by promises and has a say in it.
-    pub(in crate::executive) fn on_launcher(&mut self, percept: &Percept) -> Option<Setpoint> {
+    pub(in crate::executive) fn on_launcher(&mut self, percept: &Percept) -> Option<Launch> {
         let c = self.contingency.as_ref()?;
         let due_ms = c.schedule.map(|(_, at_ms)| at_ms);
-        let launch = match due_ms.filter(|due_ms| *due_ms > percept.time_ms) {
-            Some(due_ms) => Launch::At(due_ms),
-            None if percept.launch_ready => self.stand(percept),
+        match due_ms.filter(|due_ms| *due_ms > percept.time_ms) {
+            Some(due_ms) => Some(Launch::At(due_ms)),
+            None if percept.launch_ready => Some(self.stand(percept)),
             None => {
                 self.contingency = Some(Contingency {
                     goals: c.goals + 1,
                     ..Contingency::new()
                 });
-                return None;
+                None
             }
-        };
-        let setpoint = Setpoint {
-            launch,
-            ..self.setpoint(percept, Vec::new())
-        };
-        self.played = Some(Played {
-            percept: *percept,
-            steps: Vec::new(),
-            airspeed_mps: setpoint.airspeed_mps,
-            gimbal: Vec::new(),
-        });
-        Some(setpoint)
+        }
     }
 
     /// Nothing is agreed, or it was not flown in time.

@@ -4,6 +4,7 @@ use super::Swarm;
 use super::sim_peer::Process;
 use crate::check::crowds::CrowdGlance;
 use skein_geometry::frame::Point;
+use skein_geometry::hash::folded;
 use skein_geometry::random::mix;
 use skein_peer::gathering::Sector;
 use skein_peer::output::TaskNews;
@@ -106,10 +107,7 @@ impl Swarm {
             return (task.number, revision);
         }
         let all = u64::from(task.author) << 48 | u64::from(task.number) << 32 | u64::from(revision);
-        let hash = mix(all);
-        #[allow(clippy::cast_possible_truncation, reason = "half of a hash is one")]
-        let half = (hash ^ hash >> 32) as u32;
-        (task.number | UAVS, half)
+        (task.number | UAVS, folded(mix(all)))
     }
 
     /// What was told beside what was true, at the end.

@@ -18,7 +18,7 @@
 
 use crate::wire::limits::DURATION_MAX_MS;
 use crate::wire::message::{Bid, Epoch, Member, Round};
-use skein_geometry::hash::Fnv;
+use skein_geometry::hash::{Fnv, folded};
 use std::collections::BTreeMap;
 use std::hash::Hash;
 
@@ -36,16 +36,7 @@ pub fn order_of(round: &Round) -> RoundOrder {
         round.repair,
     )
         .hash(&mut h);
-    (round.counter, round.members.len(), fold(h.finish()))
-}
-
-fn fold(h: u64) -> u32 {
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "both halves are folded into one on purpose"
-    )]
-    let folded = (h ^ (h >> 32)) as u32;
-    folded
+    (round.counter, round.members.len(), folded(h.finish()))
 }
 
 /// The highest round that names this peer, with the bids held.
@@ -329,7 +320,7 @@ pub fn epoch_of(open: &OpenRound) -> Epoch {
     }
     let (counter, members, order) = order_of(&open.round);
     let members = u32::try_from(members.min(255)).unwrap_or(255);
-    let hash = (members << 24) | (order >> 20 << 12) | (fold(h.finish()) & 0xfff);
+    let hash = (members << 24) | (order >> 20 << 12) | (folded(h.finish()) & 0xfff);
     Epoch { counter, hash }
 }
 

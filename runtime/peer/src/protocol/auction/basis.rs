@@ -7,7 +7,7 @@ use crate::PeerId;
 use crate::wire::tasks::{
     BUNDLE_MAX, Bundle, BundleTask, DONE_MAX, Progress, Task, TaskId, TaskState,
 };
-use skein_geometry::hash::Fnv;
+use skein_geometry::hash::{Fnv, folded};
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher};
 
@@ -121,9 +121,6 @@ impl Auction {
         self.map.hash(&mut hash);
         self.problem(false).hash(&mut hash);
         self.problem(true).hash(&mut hash);
-        let hash = Hasher::finish(&hash);
-        u32::try_from((hash ^ hash >> 32) & 0xffff_ffff)
-            .unwrap_or(0)
-            .max(1)
+        folded(Hasher::finish(&hash)).max(1)
     }
 }
