@@ -317,12 +317,36 @@ fn a_trial_with_everything(r: &mut Readme) {
     }
     let given = "skein mission submit|revise SCENARIO";
     well(r.instead(given, "skein mission revise helsinki"));
+    a_way_along_streets(r, given);
     well(r.instead(given, "skein mission submit helsinki"));
     well(r.instead(order, "skein mission rtb"));
 
     peer_of_its_own(r);
     // Nobody is told to go on, so that the trial would last until its scenario's time is over.
     trial.ends(4);
+}
+
+/// The mission is replaced by one that brings streets, along which a way is asked for.
+fn a_way_along_streets(r: &mut Readme, given: &str) {
+    let trials = root().join("configs/trials");
+    let text = fs::read_to_string(trials.join("helsinki.json5")).unwrap();
+    let data = root().join("configs/data");
+    let text = text.replace("../data", data.to_str().unwrap());
+    let streets = "mission: { streets: { ways_m: [[[0, 0], [250, 400], [700, 400]]] } },";
+    let text = text.replacen("level_m: 45,", &format!("level_m: 45, {streets}"), 1);
+    r.place.file("streets.json5", &text);
+    well(r.instead(given, "skein mission submit streets.json5"));
+    // The ground station follows it as soon as it has computed what follows from it.
+    wait_until(DEADLINE, "a way is hinted", || {
+        let mut hint = r.exactly("skein hint 60.1690,24.9400 60.1655,24.9355");
+        let out = hint.output().unwrap();
+        out.status.success() && String::from_utf8_lossy(&out.stdout).contains("way asked for")
+    });
+    let back = r.instead(
+        "skein hint FROM TO",
+        "skein hint 60.1655,24.9355 60.1690,24.9400",
+    );
+    assert!(told(back).contains("m in"));
 }
 
 /// A trial runs this verb for each UAV; by the configuration that explains every field it finds

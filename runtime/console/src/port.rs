@@ -105,6 +105,9 @@ async fn accept<R: DeserializeOwned + Send + 'static>(
     }
 }
 
+/// Why a line was not read to its end.
+const CLOSED: &str = "the connection was closed";
+
 async fn serve<R: DeserializeOwned>(
     mut stream: TcpStream,
     token: &Token,
@@ -113,6 +116,10 @@ async fn serve<R: DeserializeOwned>(
     let (reader, mut writer) = stream.split();
     let mut reader = BufReader::new(reader);
     let said = read_line(&mut reader, MAX_TOKEN_CHARS).await;
+    if said.as_ref().is_err_and(|why| why == CLOSED) {
+        // Who only looks whether anybody listens says nothing.
+        return;
+    }
     if !said.as_ref().is_ok_and(|said| token.is(said)) {
         tracing::warn!("a command with a wrong token was refused");
         let why = "the token is wrong; nothing was read or done".to_owned();
@@ -168,7 +175,7 @@ async fn read_line(reader: &mut BufReader<ReadHalf<'_>>, longest: usize) -> Resu
         return Err(if line.len() >= longest {
             format!("a line of more than {longest} bytes")
         } else {
-            "the connection was closed".to_owned()
+            CLOSED.to_owned()
         });
     }
     String::from_utf8(line).map_err(|_| "a line that is no text".to_owned())

@@ -9,8 +9,9 @@
 use crate::mission::{PointMm, mm};
 use crate::usage::{StretchSum, Usages};
 use serde::{Deserialize, Serialize};
-use skein_flight::streets::quickest::Leg;
+use skein_flight::streets::quickest::{Leg, REACH_M};
 use skein_geometry::frame::Point;
+use std::fmt;
 use thiserror::Error;
 
 /// The usual speed counts as one vehicle that was watched for so long, seconds.
@@ -93,17 +94,41 @@ pub enum NoWay {
     /// Nobody was told of streets.
     #[error("the mission brings no streets (mission.streets)")]
     Streets,
+    /// A place is far from all of them.
+    #[error("it would {0} more than {REACH_M} m from the mission's streets")]
+    Far(End),
     /// There is none.
     #[error("the mission's streets do not lead from there to there")]
     Apart,
+}
+
+/// An end of a way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// Where it begins.
+    First,
+    /// Where it ends.
+    Last,
+}
+
+impl fmt::Display for End {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::First => "begin",
+            Self::Last => "end",
+        })
+    }
 }
 
 impl Usages {
     /// The quickest way from a place to a place, metres, with its line.
     ///
     /// # Errors
-    /// When the streets do not lead there.
+    /// When a place is far from the streets, or they do not lead there.
     pub fn way(&self, from: Point, to: Point) -> Result<WayHint, NoWay> {
+        for (place, end) in [(from, End::First), (to, End::Last)] {
+            self.network().nearest(place).ok_or(NoWay::Far(end))?;
+        }
         let hint = self.hint("asked for", from, to).ok_or(NoWay::Apart)?;
         let leg = |&(edge, from_m, to_m): &(u16, f64, f64)| Leg { edge, from_m, to_m };
         let legs: Vec<Leg> = hint.legs.iter().map(leg).collect();
@@ -289,7 +314,12 @@ mod tests {
         assert!((hint.length_m - 60.0).abs() < 1e-6);
         let far = Point::new(5_000.0, 0.0);
         assert!(usages.hint("far", from, far).is_none());
-        assert_eq!(usages.way(from, far), Err(NoWay::Apart));
+        assert_eq!(usages.way(from, far), Err(NoWay::Far(End::Last)));
+        let why = usages.way(far, to).unwrap_err().to_string();
+        assert_eq!(
+            why,
+            "it would begin more than 150 m from the mission's streets"
+        );
     }
 
     #[test]

@@ -3,13 +3,16 @@
 //!
 //! # Guarantees
 //! No way along the streets takes less, from the place of a street that is nearest to the first
-//! place to that nearest to the second, by the seconds a metre that each stretch is given.
+//! place to that nearest to the second, by the seconds a metre that each stretch is given. Where
+//! these two do not hang together, the nearest that do take their part.
 
 use super::matching::Matched;
 use super::network::Network;
 use petgraph::algo::astar;
 use petgraph::graph::{NodeIndex, UnGraph};
+use petgraph::unionfind::UnionFind;
 use skein_geometry::frame::Point;
+use std::collections::BTreeMap;
 
 /// Who asks is no farther from a street, metres.
 pub const REACH_M: f64 = 150.0;
@@ -49,6 +52,37 @@ impl Network {
         best
     }
 
+    /// Where a way begins and where it ends: where streets that hang together pass nearest to both
+    /// places. A stub of a street that leads nowhere does not keep the next street from serving.
+    fn ends_of_way(&self, from: Point, to: Point) -> Option<(Matched, Matched)> {
+        let mut joined = UnionFind::<usize>::new(self.crossings().len());
+        for e in self.edges() {
+            let [a, b] = e.ends.map(usize::from);
+            joined.try_union(a, b).ok()?;
+        }
+        let of = |m: &Matched| {
+            let e = self.edges().get(usize::from(m.edge))?;
+            joined.try_find(usize::from(e.ends[0]))
+        };
+        let nearest = |place: Point| {
+            let mut by: BTreeMap<usize, Matched> = BTreeMap::new();
+            let near = self.on_each_piece(place).map(|(m, _)| m);
+            for m in near.filter(|m| m.aside_m <= REACH_M) {
+                let Some(part) = of(&m) else { continue };
+                let best = by.entry(part).or_insert(m);
+                if m.aside_m <= best.aside_m {
+                    *best = m;
+                }
+            }
+            by
+        };
+        let (begins, ends) = (nearest(from), nearest(to));
+        let both = begins
+            .iter()
+            .filter_map(|(part, a)| Some((*a, *ends.get(part)?)));
+        both.min_by(|(a, b), (c, d)| (a.aside_m + b.aside_m).total_cmp(&(c.aside_m + d.aside_m)))
+    }
+
     /// The quickest way, its parts in order; none where the streets do not lead there, or a place
     /// is far from all of them. `s_per_m` gives the seconds a metre of each stretch.
     #[must_use]
@@ -58,7 +92,7 @@ impl Network {
         to: Point,
         s_per_m: &dyn Fn(u16) -> f64,
     ) -> Option<Vec<Leg>> {
-        let (begin, end) = (self.nearest(from)?, self.nearest(to)?);
+        let (begin, end) = self.ends_of_way(from, to)?;
         // Nodes are the crossings, then the two places.
         let mut graph: UnGraph<(), (f64, Leg)> = UnGraph::default();
         let nodes: Vec<NodeIndex> = (0..self.crossings().len() + 2)
@@ -186,6 +220,22 @@ mod tests {
             .quickest(from, Point::new(0.0, 180.0), &|_| 0.1)
             .unwrap();
         assert!(near.len() == 1 && (near[0].length_m() - 30.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_stub_that_leads_nowhere_is_passed_over() {
+        let mut streets = grid(3, 100.0);
+        streets.push((0, vec![Point::new(-30.0, 20.0), Point::new(-30.0, 80.0)]));
+        let net = Network::of(&streets);
+        let (from, to) = (Point::new(-25.0, 50.0), Point::new(300.0, 150.0));
+        assert!((net.nearest(from).unwrap().aside_m - 5.0).abs() < 1e-9);
+        let way = net.quickest(from, to, &|_| 0.1).unwrap();
+        assert!((way.iter().map(Leg::length_m).sum::<f64>() - 400.0).abs() < 1e-6);
+        // Who drives from end to end of the stub stays on it.
+        let along = net
+            .quickest(from, Point::new(-30.0, 58.0), &|_| 0.1)
+            .unwrap();
+        assert!((along.iter().map(Leg::length_m).sum::<f64>() - 8.0).abs() < 1e-6);
     }
 
     /// Bellman and Ford, on crossings alone.
