@@ -6,6 +6,7 @@ use skein_link::{Hearing, LinkState};
 use skein_netsim::fault::Fault;
 use skein_netsim::radio::{LinkTable, Overlay};
 use skein_netsim::spec::Spec;
+use skein_netsim::witnessed::AskedLook;
 use skein_netsim::world::{Fact, Judge, Site, Survey, World};
 use skein_peer::offload::MissionGeometry;
 use std::sync::Arc;
@@ -111,6 +112,11 @@ impl LiveWorld {
     /// A mission ended by its time; see [`World::end_laps`].
     pub fn end_laps(&mut self) -> bool {
         self.world.end_laps()
+    }
+
+    /// Somebody asks for a look.
+    pub fn ask(&mut self, look: AskedLook) {
+        self.world.ask(look.task, look.pieces, look.carriers);
     }
 
     /// A revision of the mission is judged by from now on.

@@ -16,6 +16,7 @@ use skein_link::{LinkNews, RadioCounters};
 use skein_netsim::spec::Spec;
 use skein_netsim::world::percept_phase_ms;
 use skein_peer::Report;
+use skein_peer::witness::Witness;
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::Path;
@@ -63,6 +64,13 @@ pub(crate) enum Said {
         id: u16,
         /// What.
         report: Report,
+    },
+    /// It says what it sees or knows.
+    Witness {
+        /// Which.
+        id: u16,
+        /// What.
+        witness: Witness,
     },
     /// One life of it has ended: what its radio did.
     Radio(RadioCounters),
@@ -272,6 +280,14 @@ impl Peers {
                     None
                 }
             },
+            ToWorld::Witness(_) if silent => None,
+            ToWorld::Witness(bytes) => match cbor4ii::serde::from_slice(&bytes) {
+                Ok(witness) => Some(Said::Witness { id, witness }),
+                Err(cause) => {
+                    tracing::warn!(id, %cause, "what a peer sees cannot be read");
+                    None
+                }
+            },
             ToWorld::Radio(counters) => {
                 let (arrived, late) = peer.counted(counters);
                 (!silent).then_some(Said::Heard { arrived, late })
@@ -286,7 +302,14 @@ impl Peers {
 
     /// Follows the world by a step: tells everybody the time and the links, and what it senses
     /// once in so many milliseconds, each when it is due as in simulated runs.
-    pub(crate) fn tell(&mut self, clock: Clock, world: &LiveWorld, percept_period_ms: u32) {
+    /// Gives who was told what it senses.
+    pub(crate) fn tell(
+        &mut self,
+        clock: Clock,
+        world: &LiveWorld,
+        percept_period_ms: u32,
+    ) -> Vec<u16> {
+        let mut sensed = Vec::new();
         self.transports.follow(world);
         let on_air: Vec<u16> = self
             .by_id
@@ -311,11 +334,13 @@ impl Peers {
                 .filter(|_| senses(clock.now_ms, nth, of, percept_period_ms));
             if percept.is_some() {
                 peer.told_percept(clock.now_ms);
+                sensed.push(*id);
             }
             if let Some(line) = peer.line() {
                 line.tick(clock.now_ms, clock.scale, percept, news);
             }
         }
+        sensed
     }
 
     /// How long anybody has owed the answer to a percept, milliseconds of scenario time.
@@ -374,20 +399,20 @@ impl Peers {
     }
 
     /// Tells everybody to leave, and ends who does not; gives what their radios did.
-    pub(crate) async fn end(&mut self) -> Vec<RadioCounters> {
+    pub(crate) async fn end(&mut self) -> (Vec<RadioCounters>, Vec<Said>) {
         for peer in self.by_id.values_mut() {
             peer.dismiss();
         }
-        let mut radios = Vec::new();
+        let (mut radios, mut said) = (Vec::new(), Vec::new());
         let deadline = Instant::now() + GOODBYE_TIMEOUT;
         while self.by_id.values().any(LivePeer::is_connected) {
             match tokio::time::timeout_at(deadline, self.streams.next()).await {
                 Ok(Some(Heard::Frame {
                     id,
                     pid,
-                    frame: frame @ (ToWorld::Radio(_) | ToWorld::Bye),
+                    frame: frame @ (ToWorld::Radio(_) | ToWorld::Witness(_) | ToWorld::Bye),
                 })) => {
-                    self.frame((id, pid), frame);
+                    said.extend(self.frame((id, pid), frame));
                 }
                 Ok(Some(Heard::Gone { id, pid })) => {
                     if let Some(peer) = self.by_id.get_mut(&id).filter(|p| p.is_process(pid)) {
@@ -404,7 +429,7 @@ impl Peers {
             radios.push(peer.take_radio());
             peer.wait_or_kill().await;
         }
-        radios
+        (radios, said)
     }
 
     /// Ends the guard.

@@ -16,9 +16,12 @@ use skein_netsim::account::{
 };
 use skein_netsim::fault::Fault;
 use skein_netsim::spec::Spec;
+use skein_netsim::witnessed::{AskedLook, Witnessed};
 use skein_netsim::world::{Fact, Loss, Survey};
+use skein_peer::input::AskedTask;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::output::TaskNews;
+use skein_peer::witness::Witness;
 use skein_peer::{Mission, Report};
 use skein_recording::Sink;
 use skein_recording::run_dir::{self, Manifest};
@@ -132,9 +135,14 @@ pub async fn run(
     };
     let wall = trial.began.elapsed();
     let used = trial.peers.used();
-    for radio in trial.peers.end().await {
+    let (radios, last) = trial.peers.end().await;
+    for radio in radios {
         trial.account.radio(&radio);
     }
+    for said in last {
+        trial.take(Some(said));
+    }
+    trial.judge_witnessed();
     let result = flown.map(|()| trial.conclude(wall, &used));
     if let Ok(report) = &result {
         trial.observed.tell(|o| o.end(report));
@@ -183,6 +191,10 @@ struct Trial<'a> {
     timed: bool,
     /// What the mission looks for.
     looked_for: LookedFor,
+    /// What peers say of what they see.
+    witnessed: Witnessed,
+    /// The mission that is judged.
+    mission: Arc<Mission>,
     /// Transmissions that reached a node since it was last looked at, and late ones.
     transmissions: (u64, u64),
     /// Setpoints that arrived.
@@ -259,6 +271,8 @@ impl<'a> Trial<'a> {
             cancelled: false,
             timed: geometry.mission.ends_after_s().is_some(),
             looked_for: LookedFor::new(&geometry.mission),
+            witnessed: Witnessed::new(&spec, &geometry.mission),
+            mission: Arc::clone(&geometry.mission),
             transmissions: (0, 0),
             setpoints: 0,
             starved: 0,
@@ -271,6 +285,8 @@ impl<'a> Trial<'a> {
     /// Launches everybody, and runs the world until the mission is over.
     async fn fly(&mut self) -> Result<(), TrialError> {
         self.launch().await?;
+        let brought = self.mission.brought(false);
+        self.asked(&brought);
         self.began = Instant::now();
         self.pacer = Pacer::new(self.spec.time_scale, self.began);
         loop {
@@ -378,6 +394,10 @@ impl<'a> Trial<'a> {
                         wrong.into_iter().for_each(|text| self.account.failed(text));
                         self.account.detected(self.looked_for.reports());
                     }
+                    Report::Crowd { told } => {
+                        let is_ground = self.spec.ground.as_ref().is_some_and(|g| g.id == id);
+                        self.witnessed.alerted((self.now_ms, id, is_ground), told);
+                    }
                     Report::Task { id: task, news, .. } if *news == TaskNews::Follows => {
                         self.looked_for.follows(self.now_ms, *task);
                         self.account.detected(self.looked_for.reports());
@@ -389,6 +409,7 @@ impl<'a> Trial<'a> {
                     self.note(line);
                 }
             }
+            Some(Said::Witness { id, witness }) => self.witness(id, witness),
             Some(Said::Radio(radio)) => self.account.radio(&radio),
             Some(Said::Crashed { id, radio, why }) => {
                 self.account.radio(&radio);
@@ -424,6 +445,9 @@ impl<'a> Trial<'a> {
                 self.cancelled = mission.cancelled;
                 self.timed = mission.ends_after_s().is_some();
                 self.looked_for.given(mission);
+                self.witnessed.given(mission);
+                self.mission = Arc::clone(mission);
+                self.asked(&mission.brought(false));
                 // Whoever believed the last one finished has not begun this one.
                 self.all_finished_ms = None;
                 let mut text = format!("the operator gives revision {}", mission.revision);
@@ -435,6 +459,50 @@ impl<'a> Trial<'a> {
                 }
                 self.note(text);
             }
+        }
+    }
+
+    /// A peer says what it sees or knows.
+    fn witness(&mut self, id: u16, witness: Witness) {
+        match witness {
+            Witness::Looked(looked) => self.witnessed.looked(id, *looked),
+            Witness::Known(known) => {
+                if known.is_ground {
+                    self.asked(&known.tasks);
+                }
+                self.witnessed.knows(id, *known);
+            }
+        }
+    }
+
+    /// Tasks that the ground station holds, or the mission brings.
+    fn asked(&mut self, tasks: &[AskedTask]) {
+        for asked in tasks {
+            self.account.asked(self.now_ms, asked);
+            if let Some(look) = AskedLook::of(&self.spec, &self.mission, asked) {
+                self.world.ask(look);
+            }
+        }
+    }
+
+    /// The run is over: what peers said last is judged, and all of it goes into the account.
+    fn judge_witnessed(&mut self) {
+        self.witnessed.end(self.now_ms, self.world.world());
+        self.note_broken();
+        self.account.counted(self.witnessed.counts(self.now_ms));
+        self.account.used(self.witnessed.streets());
+        self.account.gathered(self.witnessed.crowd());
+        self.account.traced(self.witnessed.contour());
+        for (task, tracked) in self.witnessed.tracked() {
+            self.account.tracked(task, tracked);
+        }
+    }
+
+    /// Rules that were broken fail the trial.
+    fn note_broken(&mut self) {
+        for text in self.witnessed.broken() {
+            self.account.failed(text.clone());
+            self.note(text);
         }
     }
 
@@ -495,8 +563,12 @@ impl<'a> Trial<'a> {
         if let Some(text) = self.account.connected(&components) {
             self.note(text);
         }
-        self.peers
-            .tell(self.clock(), &self.world, self.spec.percept_period_ms);
+        let period_ms = self.spec.percept_period_ms;
+        for uav in self.peers.tell(self.clock(), &self.world, period_ms) {
+            self.witnessed.sensed(self.now_ms, uav, self.world.world());
+        }
+        self.witnessed.stepped(self.now_ms, self.world.world());
+        self.note_broken();
         if self.now_ms.is_multiple_of(LOOK_MS) {
             let (arrived, late) = std::mem::take(&mut self.transmissions);
             if self.pacer.heard(arrived, late) {

@@ -45,6 +45,7 @@ pub mod timeline;
 mod troubles;
 mod twins;
 pub mod weather;
+pub mod witnessed;
 pub mod world;
 
 pub use check::Findings;
@@ -56,3 +57,4 @@ pub use check::footprint::FootprintErrors;
 pub use check::streets::{HintReport, StreetsReport};
 pub use geometry_cache::geometry_of;
 pub use prepared::Prepared;
+pub use witnessed::Witnessed;

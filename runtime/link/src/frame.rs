@@ -3,7 +3,8 @@
 //!
 //! A frame is four bytes of length, most significant first, and one CBOR value.
 //! [`encode`] and [`Decoder`] know no socket; who moves the bytes is up to both ends.
-//! Bytes of a [`ToWorld::Report`] stay bytes here: this crate does not know the peer.
+//! Bytes of a [`ToWorld::Report`] or a [`ToWorld::Witness`] stay bytes here: this crate does not
+//! know the peer.
 
 use crate::{LinkNews, RadioCounters};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -69,6 +70,9 @@ pub enum ToWorld {
     Setpoint(Setpoint),
     /// A report of the peer, encoded by the peer's own crate.
     Report(#[serde(with = "serde_bytes")] Vec<u8>),
+    /// What the peer says of what it sees and knows, encoded likewise: for a judge, not for
+    /// displays.
+    Witness(#[serde(with = "serde_bytes")] Vec<u8>),
     /// What the radio did since the node started.
     Radio(RadioCounters),
     /// The node has flushed everything and leaves.
@@ -118,7 +122,11 @@ impl Frame for ToWorld {
     fn check(&self) -> Result<(), FrameError> {
         match self {
             Self::Setpoint(setpoint) => check_setpoint(setpoint),
-            Self::Hello { .. } | Self::Report(_) | Self::Radio(_) | Self::Bye => Ok(()),
+            Self::Hello { .. }
+            | Self::Report(_)
+            | Self::Witness(_)
+            | Self::Radio(_)
+            | Self::Bye => Ok(()),
         }
     }
 }

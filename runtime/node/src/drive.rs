@@ -23,6 +23,7 @@ use skein_console::{Answer, Asked, Command as Request};
 use skein_peer::input::{AskedTask, TaskEdit};
 use skein_peer::mission::PointMm;
 use skein_peer::offload::{Job, JobResult, run};
+use skein_peer::witness::Witness;
 use skein_peer::{Command, Incarnation, Input, Mission, Output, Peer, Time, Transmission};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -30,6 +31,9 @@ use tokio::sync::{mpsc, oneshot};
 
 /// How often the radio's counters go to the world, milliseconds of scenario time.
 const COUNTERS_PERIOD_MS: u64 = 1_000;
+
+/// How often what the peer knows goes to the world, for its judge, milliseconds of scenario time.
+const KNOWN_PERIOD_MS: u64 = 2_000;
 
 /// Jobs under way at once: a peer asks for the next division only when the last
 /// one is dead, and for the geometry once a revision.
@@ -71,6 +75,10 @@ pub trait PeerLogic: Send {
     fn operators_tasks(&self) -> Vec<AskedTask>;
     /// A number that grows with each change of these.
     fn tasks_version(&self) -> u64;
+    /// What it says of its last percept, for a judge; none where there is nothing to judge.
+    fn looked(&self) -> Option<Witness>;
+    /// What it knows now, milliseconds of scenario time, likewise.
+    fn known(&self, at_ms: u64) -> Option<Witness>;
 }
 
 impl PeerLogic for Peer {
@@ -135,6 +143,14 @@ impl PeerLogic for Peer {
     fn tasks_version(&self) -> u64 {
         Peer::tasks_version(self)
     }
+
+    fn looked(&self) -> Option<Witness> {
+        Peer::looked(self)
+    }
+
+    fn known(&self, at_ms: u64) -> Option<Witness> {
+        Peer::known(self, at_ms)
+    }
 }
 
 /// What is around a peer.
@@ -187,6 +203,7 @@ pub struct Driver<P, V, W, C, T> {
     /// Came while the clock stood still.
     early: Option<Event>,
     counters_due: Time,
+    known_due: Time,
 }
 
 /// Whether a mission of the operator can be flown.
@@ -245,6 +262,7 @@ where
             tasks_kept: 0,
             early: None,
             counters_due: Time(0),
+            known_due: Time(0),
         }
     }
 
@@ -306,7 +324,12 @@ where
         match happened {
             Happened::World(News::End) => return false,
             Happened::World(News::Tick(tick)) => self.tick(tick).await,
-            Happened::Sensed(percept) => self.step(Input::Percept(*percept)).await,
+            Happened::Sensed(percept) => {
+                self.step(Input::Percept(*percept)).await;
+                if let Some(looked) = self.peer.looked() {
+                    self.around.world.witness(&looked).await;
+                }
+            }
             Happened::Stored(Stored { token, ok }) => self.step(Input::Stored { token, ok }).await,
             Happened::Computed(token, result) => self.step(Input::Computed { token, result }).await,
             Happened::Asked(asked) => self.asked(asked).await,
@@ -333,6 +356,16 @@ where
         if now >= self.counters_due {
             self.counters_due = now.plus_ms(COUNTERS_PERIOD_MS);
             self.count().await;
+        }
+        if now >= self.known_due {
+            self.known_due = now.plus_ms(KNOWN_PERIOD_MS);
+            self.tell_known(now).await;
+        }
+    }
+
+    async fn tell_known(&mut self, now: Time) {
+        if let Some(known) = self.peer.known(now.0) {
+            self.around.world.witness(&known).await;
         }
     }
 
@@ -639,6 +672,8 @@ where
 
     /// Flushes what is under way and says goodbye.
     async fn leave(mut self) {
+        let now = self.now();
+        self.tell_known(now).await;
         self.count().await;
         self.around.world.leave().await;
         self.around.transport.close().await;

@@ -11,6 +11,7 @@ use skein_behaviors::{Percept, Setpoint};
 use skein_link::RadioCounters;
 use skein_link::frame::{Decoder, FrameError, ToPeer, ToWorld, encode};
 use skein_peer::Report;
+use skein_peer::witness::Witness;
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -248,6 +249,13 @@ impl World for SimulatedWorld {
         match cbor4ii::serde::to_vec(Vec::new(), report) {
             Ok(bytes) => self.shared.tell(&ToWorld::Report(bytes)).await,
             Err(cause) => tracing::error!(%cause, "a report was not sent"),
+        }
+    }
+
+    async fn witness(&mut self, witness: &Witness) {
+        match cbor4ii::serde::to_vec(Vec::new(), witness) {
+            Ok(bytes) => self.shared.tell(&ToWorld::Witness(bytes)).await,
+            Err(cause) => tracing::error!(%cause, "what is seen was not sent"),
         }
     }
 

@@ -3,6 +3,7 @@
 
 use skein_link::{LinkNews, RadioCounters};
 use skein_peer::Report;
+use skein_peer::witness::Witness;
 use std::future::Future;
 
 /// Something the world tells.
@@ -35,6 +36,9 @@ pub trait World: Send {
     /// What the peer reports, for displays and judges.
     fn report(&mut self, report: &Report) -> impl Future<Output = ()> + Send;
 
+    /// What the peer says of what it sees and knows, for judges.
+    fn witness(&mut self, witness: &Witness) -> impl Future<Output = ()> + Send;
+
     /// What the radio did so far.
     fn count(&mut self, counters: RadioCounters) -> impl Future<Output = ()> + Send;
 
@@ -54,6 +58,12 @@ impl<W: World> World for Option<W> {
     async fn report(&mut self, report: &Report) {
         if let Some(world) = self {
             world.report(report).await;
+        }
+    }
+
+    async fn witness(&mut self, witness: &Witness) {
+        if let Some(world) = self {
+            world.witness(witness).await;
         }
     }
 

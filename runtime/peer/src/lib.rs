@@ -145,6 +145,7 @@ pub mod usage;
 mod varint;
 pub mod why;
 pub mod wire;
+pub mod witness;
 mod zone_watch;
 
 pub use beliefs::Beliefs;

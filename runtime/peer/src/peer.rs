@@ -11,6 +11,7 @@
 //!
 //! Outputs, the journal's tokens and the relay belong to the peer alone.
 
+use crate::Follows;
 use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::{Cooperation, Situation};
@@ -987,6 +988,21 @@ impl Peer {
     pub fn footprint(&self) -> Option<Footprint> {
         let executive = self.cooperation.state()?.executive.as_ref()?;
         Some(Footprint::of(executive))
+    }
+
+    /// When it sensed last, milliseconds.
+    pub(crate) fn sensed_ms(&self) -> Option<u64> {
+        self.percept.as_ref().map(|p| p.time_ms)
+    }
+
+    /// Whom it says that it follows, once it had seen it.
+    pub(crate) fn follows(&self) -> Option<Follows> {
+        self.cooperation.tasking.follows()
+    }
+
+    /// The mission that it follows.
+    pub(crate) fn followed(&self) -> Option<&Mission> {
+        Some(&self.cooperation.state()?.geometry.mission)
     }
 
     /// What this UAV counted itself at each site of its mission, and whether it does so by its last

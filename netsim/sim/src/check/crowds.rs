@@ -279,25 +279,50 @@ impl CrowdCheck {
 
     /// What all are told, beside what was true, and whether they are told the same.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
-        let Some(watch) = self.watch.clone() else {
+        if self.watch.is_none() {
             return;
-        };
+        }
         let follows = |m: &&PeerSnapshot| m.view.revision >= self.revision;
         let peers: Vec<&PeerSnapshot> = snapshot.peers.iter().filter(follows).collect();
         let able = peers
             .iter()
             .filter(|m| m.uav && m.view.speaks && !m.view.finished);
-        self.able = able.map(|m| (m.id, m.view.interval_ms)).collect();
-        for (sector, s) in peers.iter().flat_map(|m| &m.view.crowd) {
-            self.judge_look(*sector, s);
+        self.on_able(able.map(|m| (m.id, m.view.interval_ms)).collect());
+        for m in &peers {
+            self.on_known(&m.view.crowd);
         }
         self.look_for_lacks(snapshot, &peers, found);
         let ground = peers.iter().find(|m| !m.uav).or(peers.first());
         if let Some(m) = ground {
-            let known = m.view.crowd.iter().map(|(n, s)| (*n, *s)).collect();
-            let known = Crowd::new(Arc::clone(&watch), known);
-            self.judge_people(snapshot.now_ms, &known);
+            self.on_ground(snapshot.now_ms, &m.view.crowd);
         }
+    }
+
+    /// Who flies the newest mission and is not through with it, each with how often it speaks,
+    /// milliseconds.
+    pub fn on_able(&mut self, able: BTreeMap<u16, u64>) {
+        self.able = able;
+    }
+
+    /// What a peer was told, by sector.
+    pub fn on_known(&mut self, crowd: &[(u16, Sector)]) {
+        for (sector, s) in crowd {
+            self.judge_look(*sector, s);
+        }
+    }
+
+    /// What the ground station was told, or who is asked in its place.
+    pub fn on_ground(&mut self, now_ms: u64, crowd: &[(u16, Sector)]) {
+        if let Some(known) = self.crowd_of(crowd) {
+            self.judge_people(now_ms, &known);
+        }
+    }
+
+    /// It as one peer was told of it; none without an event.
+    #[must_use]
+    pub fn crowd_of(&self, crowd: &[(u16, Sector)]) -> Option<Crowd> {
+        let known = crowd.iter().map(|(n, s)| (*n, *s)).collect();
+        Some(Crowd::new(self.watch.clone()?, known))
     }
 
     /// A look that was told.

@@ -439,7 +439,7 @@ fn base_of(bases: &BTreeMap<u32, Point>, revision: u32) -> Option<Point> {
     bases.range(..=revision).next_back().map(|(_, b)| *b)
 }
 
-fn flyer(uav: &UavSpec, spec: &Spec) -> Flyer {
+pub(crate) fn flyer(uav: &UavSpec, spec: &Spec) -> Flyer {
     let wind_mps = spec.wind.strongest().speed_mps();
     let airframe = &uav.airframe;
     Flyer {

@@ -20,6 +20,7 @@ use skein_peer::Mission;
 use skein_peer::hint::Hint;
 use skein_peer::streets::Streets;
 use skein_peer::usage::Usages;
+use skein_peer::witness::StreetsSeen;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -246,6 +247,13 @@ impl StreetCheck {
             }
         }
         self.now_ms = now_ms;
+    }
+
+    /// What was carried here of how streets are used; none without streets.
+    #[must_use]
+    pub fn usages_of(&self, seen: &StreetsSeen) -> Option<Usages> {
+        let (streets, network) = self.streets.clone()?;
+        Some(Usages::of(streets, network, seen))
     }
 
     /// What a UAV says that it counted itself in its life.

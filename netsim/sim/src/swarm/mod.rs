@@ -53,6 +53,7 @@ use crate::history::{History, Kind, What, bytes_hash, pose_hash, report_hash, se
 use crate::prepared::Prepared;
 use crate::radio::{Delivery, Frame};
 use crate::spec::Spec;
+use crate::witnessed::AskedLook;
 use crate::world::{Approach, Fact, Loss, percept_phase_ms};
 use air::Air;
 use judged_loop::JudgedLoop;
@@ -933,18 +934,9 @@ impl Swarm {
             self.account.asked(self.now_ms, asked);
             self.checker.rules.relays.on_asked(asked);
             self.checker.rules.tracks.on_asked(asked);
-            if !asked.task.is_open() {
-                continue;
+            if let Some(asked) = AskedLook::of(&self.spec, mission, asked) {
+                self.air.ask(asked.task, asked.pieces, asked.carriers);
             }
-            let pieces = mission.pieces_of(&asked.task).unwrap_or_default();
-            let needed = asked.task.sensor;
-            let uavs = self.spec.uavs.iter();
-            let carriers = uavs.filter(|u| u.carries(needed)).map(|u| u.id);
-            self.air.ask(
-                (asked.number, asked.task.revision_as_asked()),
-                pieces,
-                carriers.collect(),
-            );
         }
         self.operator.note_tasks(self.now_ms, tasks);
     }

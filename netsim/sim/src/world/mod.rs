@@ -470,9 +470,21 @@ impl World {
     /// Whether nothing stands between a place on the ground and the camera of a UAV.
     #[must_use]
     pub fn is_open_to(&self, uav: u16, at: skein_geometry::frame::Point) -> bool {
+        let eye = self.eye_of(uav);
+        eye.is_some_and(|eye| self.is_open_from(eye, at))
+    }
+
+    /// Where the camera of a UAV is.
+    #[must_use]
+    pub fn eye_of(&self, uav: u16) -> Option<Place> {
+        self.body(uav).map(place_of)
+    }
+
+    /// Whether nothing stands between a place on the ground and a camera.
+    #[must_use]
+    pub fn is_open_from(&self, eye: Place, at: skein_geometry::frame::Point) -> bool {
         let place = Place { at, height_m: 1.0 };
-        let body = self.body(uav);
-        body.is_some_and(|b| self.site.obstacles.sees(place_of(b), place))
+        self.site.obstacles.sees(eye, place)
     }
 
     /// The vehicles on the ground, as they are.

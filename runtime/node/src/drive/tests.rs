@@ -8,6 +8,7 @@ use skein_behaviors::Setpoint;
 use skein_behaviors::setpoint::Side;
 use skein_link::medium::Channel;
 use skein_link::{RadioCounters, Reason};
+use skein_peer::witness::{Known, Looked};
 use skein_peer::{Priority, Report};
 use std::sync::{Mutex, MutexGuard};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
@@ -22,6 +23,7 @@ struct Seen {
     setpoints: Vec<Setpoint>,
     published: Vec<String>,
     reports: Vec<Report>,
+    witnesses: Vec<Witness>,
     counters: RadioCounters,
     left: bool,
     closed: bool,
@@ -142,6 +144,26 @@ impl PeerLogic for Double {
     fn tasks_version(&self) -> u64 {
         0
     }
+
+    fn looked(&self) -> Option<Witness> {
+        let seen = self.log.seen();
+        let percept = |(_, input): &(u64, Input)| match input {
+            Input::Percept(percept) => Some(percept.time_ms),
+            _ => None,
+        };
+        let seen_ms = seen.inputs.iter().filter_map(percept).last()?;
+        Some(Witness::Looked(Box::new(Looked {
+            seen_ms,
+            ..Looked::default()
+        })))
+    }
+
+    fn known(&self, at_ms: u64) -> Option<Witness> {
+        Some(Witness::Known(Box::new(Known {
+            at_ms,
+            ..Known::default()
+        })))
+    }
 }
 
 /// One end of everything: the driver's when it holds receivers.
@@ -175,6 +197,10 @@ impl World for TestWorld {
 
     async fn report(&mut self, report: &Report) {
         self.log.seen().reports.push(report.clone());
+    }
+
+    async fn witness(&mut self, witness: &Witness) {
+        self.log.seen().witnesses.push(witness.clone());
     }
 
     async fn count(&mut self, counters: RadioCounters) {
@@ -357,6 +383,20 @@ async fn a_percept_becomes_a_setpoint_that_answers_it() {
     running.percepts.send(percept(400)).unwrap();
     let flown = |seen: &Seen| seen.setpoints.first().is_some_and(|s| s.from_ms == 400);
     running.log.until("a setpoint", flown).await;
+}
+
+#[tokio::test]
+async fn who_judges_is_told_what_was_seen_in_each_percept_and_what_is_known_at_last() {
+    let running = Running::start(|_| Vec::new());
+    running.tick(400);
+    running.percepts.send(percept(400)).unwrap();
+    let looked = |w: &Witness| matches!(w, Witness::Looked(l) if l.seen_ms == 400);
+    let said = |seen: &Seen| seen.witnesses.iter().any(looked);
+    running.log.until("what was seen", said).await;
+    running.tick(9_000);
+    let known = |w: &Witness| matches!(w, Witness::Known(k) if k.at_ms >= 9_000);
+    let said = |seen: &Seen| seen.witnesses.iter().any(known);
+    running.log.until("what is known", said).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]

@@ -239,7 +239,7 @@ impl Tasking {
     }
 
     /// What it says of whom it follows, once it had seen it.
-    pub(super) fn follows(&self) -> Option<Follows> {
+    pub(crate) fn follows(&self) -> Option<Follows> {
         let sought = self.sought()?;
         let held = self.flown.as_ref()?.held.as_ref()?;
         let known: Followed = self.targets.known(sought).filter(|_| held.has_begun)?;

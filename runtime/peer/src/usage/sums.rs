@@ -4,6 +4,7 @@
 use crate::counting::poisson_range;
 use crate::streets::Streets;
 use crate::wire::usage::{Usage, interval_of};
+use crate::witness::StreetsSeen;
 use serde::{Deserialize, Serialize};
 use skein_flight::streets::{Network, Turn};
 use std::collections::BTreeMap;
@@ -210,6 +211,25 @@ impl Usages {
     pub fn turns(&self) -> impl Iterator<Item = (Turn, u32)> + '_ {
         let all = self.turns.iter();
         all.filter_map(|(n, taken)| Some((*self.network.turns().get(usize::from(*n))?, *taken)))
+    }
+
+    /// The same by the numbers of turns.
+    pub(crate) fn turns_by_number(&self) -> impl Iterator<Item = (u16, u32)> + '_ {
+        self.turns.iter().map(|(n, taken)| (*n, *taken))
+    }
+
+    /// Adds what was carried from somebody else.
+    pub(crate) fn take(&mut self, seen: &StreetsSeen) {
+        let all = self.network.edges().len();
+        for (interval, stretch, sum) in &seen.stretches {
+            if usize::from(*stretch) < all {
+                let known = self.stretches.entry((*interval, *stretch)).or_default();
+                known.add(sum);
+            }
+        }
+        for (turn, taken) in &seen.turns {
+            *self.turns.entry(*turn).or_default() += taken;
+        }
     }
 
     /// How much was watched, metres times seconds.

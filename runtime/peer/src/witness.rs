@@ -1,0 +1,181 @@
+//! What a peer says of what it sees, and what it knows of what its mission watches: for whoever
+//! judges both beside what is true. No radio carries it; a live trial is told over the stream of
+//! the vehicle. A simulated run looks into its peers instead.
+
+use crate::counting::SiteCount;
+use crate::gathering::Sector;
+use crate::hint::Hint;
+use crate::input::AskedTask;
+use crate::mission::Mission;
+use crate::streets::Streets;
+use crate::tasking::Follows;
+use crate::usage::{StretchSum, Usages};
+use crate::wire::count::Count;
+use crate::wire::trail::Trail;
+use crate::{Incarnation, Peer};
+use serde::{Deserialize, Serialize};
+use skein_flight::streets::Network;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// Something that a peer says to who judges it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Witness {
+    /// Of its last percept.
+    Looked(Box<Looked>),
+    /// Of what it knows.
+    Known(Box<Known>),
+}
+
+/// What a UAV says of its last percept.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Looked {
+    /// Of when that is, milliseconds of scenario time.
+    pub seen_ms: u64,
+    /// The life in which it speaks; none while it only listens.
+    pub life: Option<Incarnation>,
+    /// The revision that it follows.
+    pub revision: u32,
+    /// How often it speaks, milliseconds.
+    pub interval_ms: u64,
+    /// Whether it believes the mission to be finished.
+    pub is_finished: bool,
+    /// Site by site whether it counts there, and what it counted.
+    pub counted: Vec<(bool, Count)>,
+    /// The places of streets that it watches, by number; none without streets.
+    pub streets: Option<BTreeSet<usize>>,
+    /// What it saw of an event itself, told or not, by sector.
+    pub own_crowd: Vec<(u16, Sector)>,
+    /// What it was told of that.
+    pub crowd: Vec<(u16, Sector)>,
+    /// Whether it flies along a contour that it sees.
+    pub traces: bool,
+    /// Whom it follows.
+    pub follows: Option<Follows>,
+}
+
+/// How streets are used, as somebody saw or was told.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StreetsSeen {
+    /// By interval and stretch.
+    pub stretches: Vec<(u16, u16, StretchSum)>,
+    /// How often each turn was taken, by its number.
+    pub turns: Vec<(u16, u32)>,
+}
+
+/// What a peer knows of what its mission watches.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Known {
+    /// When, milliseconds of scenario time.
+    pub at_ms: u64,
+    /// The life in which it speaks; none while it only listens.
+    pub life: Option<Incarnation>,
+    /// Whether it is a ground station.
+    pub is_ground: bool,
+    /// What all together counted at each site.
+    pub counts: Vec<SiteCount>,
+    /// What it saw itself of streets.
+    pub own_streets: Option<StreetsSeen>,
+    /// What all together saw of them.
+    pub streets: Option<StreetsSeen>,
+    /// The ways that its mission asks for.
+    pub hints: Vec<Hint>,
+    /// What it knows of a contour.
+    pub trails: Vec<Trail>,
+    /// What it was told of an event, by sector.
+    pub crowd: Vec<(u16, Sector)>,
+    /// The tasks of its operator.
+    pub tasks: Vec<AskedTask>,
+}
+
+impl Mission {
+    /// Whether somebody is to tell what it sees of something: counts, streets, an event, a contour.
+    #[must_use]
+    pub fn watches(&self) -> bool {
+        !self.counts.is_empty() || self.streets.is_some() || self.crowd.is_some() || self.traces()
+    }
+}
+
+impl Peer {
+    /// What it says of its last percept; none where its mission watches nothing and it follows
+    /// nobody.
+    #[must_use]
+    pub fn looked(&self) -> Option<Witness> {
+        let looked = self.last_look()?;
+        Some(Witness::Looked(Box::new(looked)))
+    }
+
+    /// What it knows of what its mission watches, and of the tasks of its operator; none where
+    /// there is neither.
+    #[must_use]
+    pub fn known(&self, at_ms: u64) -> Option<Witness> {
+        let known = self.all_known(at_ms)?;
+        Some(Witness::Known(Box::new(known)))
+    }
+
+    fn last_look(&self) -> Option<Looked> {
+        let follows = self.follows();
+        if !self.followed()?.watches() && follows.is_none() {
+            return None;
+        }
+        let beliefs = self.beliefs();
+        Some(Looked {
+            seen_ms: self.sensed_ms()?,
+            life: self.speaks_in(),
+            revision: beliefs.revision,
+            interval_ms: beliefs.interval_ms,
+            is_finished: beliefs.finished,
+            counted: self.counted().collect(),
+            streets: self.watched_streets().cloned(),
+            own_crowd: self.own_crowd().collect(),
+            crowd: beliefs.crowd,
+            traces: beliefs.traces,
+            follows,
+        })
+    }
+
+    fn all_known(&self, at_ms: u64) -> Option<Known> {
+        let tasks = self.operators_tasks();
+        let watches = self.followed().is_some_and(Mission::watches);
+        if !watches && tasks.is_empty() {
+            return None;
+        }
+        let mut known = Known {
+            at_ms,
+            life: self.speaks_in(),
+            is_ground: self.is_ground_station(),
+            tasks,
+            ..Known::default()
+        };
+        if watches {
+            let beliefs = self.beliefs();
+            known.counts = beliefs.counts;
+            known.trails = beliefs.trails.into_iter().map(|(_, t)| t).collect();
+            known.crowd = beliefs.crowd;
+            known.own_streets = self.own_usages().map(|u| u.seen());
+            known.streets = self.usages().map(|u| u.seen());
+            known.hints = self.hints();
+        }
+        Some(known)
+    }
+}
+
+impl Usages {
+    /// It without the streets, to be carried to who has these too.
+    #[must_use]
+    pub fn seen(&self) -> StreetsSeen {
+        let stretches = self.stretches().map(|((i, s), sum)| (i, s, *sum));
+        StreetsSeen {
+            stretches: stretches.collect(),
+            turns: self.turns_by_number().collect(),
+        }
+    }
+
+    /// What was carried, of these streets; stretches that they do not have are left out.
+    #[must_use]
+    pub fn of(streets: Arc<Streets>, network: Arc<Network>, seen: &StreetsSeen) -> Self {
+        let mut new = Self::new(streets, network);
+        new.take(seen);
+        new
+    }
+}
