@@ -19,6 +19,8 @@ mod support;
 mod terminal;
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tutorials;
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod watched;
 
 use serde_json::Value;
 use std::time::Duration;

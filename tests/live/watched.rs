@@ -1,0 +1,43 @@
+//! What peers of a live trial say of what they see: judged beside what is true, and reported.
+
+use crate::support::{Place, alone, root};
+use serde_json::Value;
+use std::fs;
+
+/// Two minutes above the four crossings, by three UAVs that all stay; a street is measured
+/// besides.
+fn crossings(place: &Place) -> String {
+    let text = fs::read_to_string(root().join("configs/trials/crossings.json5")).unwrap();
+    let streets = "streets: { ways_m: [[[150, 150], [550, 150]], [[150, 350], [550, 350]], \
+                   [[350, 150], [350, 350]]] },";
+    let changes = [
+        ("for_s: 900,", format!("for_s: 120, {streets}")),
+        ("count: 4, airframes", "count: 3, airframes".to_owned()),
+        ("{ at_s: 400, kind: \"kill\", peer: 3 },", String::new()),
+        ("max_kills: 3", "max_kills: 2".to_owned()),
+    ];
+    let changed = changes.iter().fold(text, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    });
+    place.file("watched.json5", &changed)
+}
+
+#[test]
+fn what_uavs_say_of_what_they_see_is_judged_beside_what_is_true() {
+    let _alone = alone();
+    let place = Place::new();
+    let file = crossings(&place);
+    let (code, said) = place.skein(&["trial", &file, "--format", "json"]);
+    let report: Value = serde_json::from_str(&said[said.find('{').unwrap()..]).unwrap();
+    assert!(code == 0 && report["passed"] == true, "{report:#}");
+    let counts = report["counts"].as_array().unwrap();
+    assert_eq!(counts.len(), 4, "{counts:#?}");
+    let sum = |of: &dyn Fn(&Value) -> u64| counts.iter().map(of).sum::<u64>();
+    // Somebody counted, the ground station knows of it, and vehicles truly passed meanwhile.
+    assert!(sum(&|c| c["counted"][1].as_u64().unwrap()) > 20_000, "{counts:#?}");
+    assert!(sum(&|c| c["known"]["watched_ms"].as_u64().unwrap()) > 10_000, "{counts:#?}");
+    assert!(sum(&|c| c["passed_in_pictures"].as_u64().unwrap()) > 0, "{counts:#?}");
+    let streets = &report["streets"];
+    assert!(streets["watched"][1].as_f64().unwrap() > 5.0, "{streets:#}");
+}
