@@ -88,7 +88,10 @@ fn the_operator_of_a_trial_revises_the_mission_adds_a_zone_and_calls_all_home() 
     assert_eq!(verdict["passed"], true, "{verdict:#}");
     let tasks = verdict["tasks"].as_array().unwrap();
     let gate = tasks.iter().find(|t| t["name"] == "gate").unwrap();
-    assert!(gate["seen_by"].is_u64() && gate["state"] == "done", "{tasks:#?}");
+    assert!(
+        gate["seen_by"].is_u64() && gate["state"] == "done",
+        "{tasks:#?}"
+    );
     assert_eq!(
         verdict["finished"].as_array().unwrap().len(),
         4,

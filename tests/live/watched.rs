@@ -35,9 +35,18 @@ fn what_uavs_say_of_what_they_see_is_judged_beside_what_is_true() {
     assert_eq!(counts.len(), 4, "{counts:#?}");
     let sum = |of: &dyn Fn(&Value) -> u64| counts.iter().map(of).sum::<u64>();
     // Somebody counted, the ground station knows of it, and vehicles truly passed meanwhile.
-    assert!(sum(&|c| c["counted"][1].as_u64().unwrap()) > 20_000, "{counts:#?}");
-    assert!(sum(&|c| c["known"]["watched_ms"].as_u64().unwrap()) > 10_000, "{counts:#?}");
-    assert!(sum(&|c| c["passed_in_pictures"].as_u64().unwrap()) > 0, "{counts:#?}");
+    assert!(
+        sum(&|c| c["counted"][1].as_u64().unwrap()) > 20_000,
+        "{counts:#?}"
+    );
+    assert!(
+        sum(&|c| c["known"]["watched_ms"].as_u64().unwrap()) > 10_000,
+        "{counts:#?}"
+    );
+    assert!(
+        sum(&|c| c["passed_in_pictures"].as_u64().unwrap()) > 0,
+        "{counts:#?}"
+    );
     let streets = &report["streets"];
     assert!(streets["watched"][1].as_f64().unwrap() > 5.0, "{streets:#}");
 }

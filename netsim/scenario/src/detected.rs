@@ -6,7 +6,9 @@ use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::runs::{Wanted, run};
 use skein_netsim::swarm::{Outcome, Swarm};
 use skein_peer::Beliefs;
+use skein_peer::criteria::coloured;
 use skein_peer::wire::tasks::Progress;
+use std::sync::Arc;
 
 fn prepared(name: &str, uavs: u16) -> Prepared {
     let over = Overrides {
@@ -71,6 +73,30 @@ fn a_search_ends_when_it_is_found_and_it_is_watched_by_one_uav_and_of_many() {
         assert!(report.found_ms.unwrap() < bus.told_ms + 10_000);
         assert_eq!(report.finished.len(), usize::from(uavs));
     }
+}
+
+/// Of two buses the mission looks for the one that would be found later; a look in twenty takes
+/// either for something else.
+#[test]
+fn a_search_for_a_colour_passes_others_by() {
+    let found = |colour: Option<u8>| {
+        let mut spec = load_builtin("search", &Overrides::default()).unwrap().spec;
+        for (v, colour) in spec.vehicles.iter_mut().zip([7, 1]) {
+            (v.kind, v.confused_permille) = (coloured(3, colour), 50);
+        }
+        let mut mission = (*spec.mission).clone();
+        mission.detections[0].colour = colour;
+        spec.mission = Arc::new(mission);
+        let faults = spec.faults.clone();
+        let outcome = run(&Prepared::new(spec), 4, faults, Wanted::default());
+        passed(&outcome);
+        let [bus] = &outcome.report.detections[..] else {
+            panic!("{:?}", outcome.report.detections);
+        };
+        (bus.looks.clone(), bus.vehicle)
+    };
+    assert_eq!(found(None), ("yellow bus".to_owned(), Some(0)));
+    assert_eq!(found(Some(1)), ("white bus".to_owned(), Some(1)));
 }
 
 #[test]

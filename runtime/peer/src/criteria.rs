@@ -24,8 +24,34 @@ pub const AT_MOST_MAX: u16 = 64;
 /// How many one tells of unless it says so.
 pub const AT_MOST: u16 = 16;
 
-/// What vehicles look like, by the number that a detector tells.
+/// What vehicles look like, by the number that a detector tells: its remainder by
+/// [`COLOURED`].
 pub const LOOKS: [&str; 4] = ["bicycle", "car", "lorry", "bus"];
+
+/// What a detector tells is the kind of a vehicle and so many times its colour; colour 0 is none
+/// that it could tell.
+pub const COLOURED: u8 = 8;
+
+/// The colours of vehicles, from colour 1 on.
+pub const COLOURS: [&str; 7] = ["white", "black", "grey", "red", "blue", "green", "yellow"];
+
+/// What a detector tells of a vehicle of this kind and colour.
+#[must_use]
+pub fn coloured(kind: u8, colour: u8) -> u8 {
+    kind % COLOURED + COLOURED * (colour % (u8::MAX / COLOURED))
+}
+
+/// The kind of what looks so.
+#[must_use]
+pub fn kind_of(looks: u8) -> u8 {
+    looks % COLOURED
+}
+
+/// The colour of what looks so; 0 for none that could be told.
+#[must_use]
+pub fn colour_of(looks: u8) -> u8 {
+    looks / COLOURED
+}
 
 /// Slower than this is as good as still, mm/s: twice what the mean over a watch is off by.
 pub const STILL_MMPS: u32 = 1_500;
@@ -36,8 +62,16 @@ pub const WORTH: u16 = 100;
 /// What an object looks like, for a person.
 #[must_use]
 pub fn looks_name(looks: u8) -> String {
-    let known = LOOKS.get(usize::from(looks));
-    known.map_or_else(|| format!("vehicle of kind {looks}"), |s| (*s).to_owned())
+    let kind = kind_of(looks);
+    let known = LOOKS.get(usize::from(kind));
+    let what = known.map_or_else(|| format!("vehicle of kind {kind}"), |s| (*s).to_owned());
+    match usize::from(colour_of(looks)) {
+        0 => what,
+        n => match COLOURS.get(n - 1) {
+            Some(colour) => format!("{colour} {what}"),
+            None => format!("{what} of colour {n}"),
+        },
+    }
 }
 
 /// What follows when an object is seen.
@@ -68,9 +102,12 @@ impl Then {
 /// What is looked for. Whole numbers alone, as all of a mission.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Criterion {
-    /// What it looks like; any where none is said.
+    /// Of which kind it is; any where none is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub looks: Option<u8>,
+    /// Its colour, from 1 on; any where none is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub colour: Option<u8>,
     /// Whether it moves; either where it is not said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving: Option<bool>,
@@ -95,6 +132,7 @@ impl Default for Criterion {
     fn default() -> Self {
         Self {
             looks: None,
+            colour: None,
             moving: None,
             faster_mmps: 0,
             then: Then::Notify,
@@ -111,7 +149,8 @@ impl Criterion {
     #[must_use]
     pub fn fits(&self, looks: u8, speed_mmps: u32) -> bool {
         let is_moving = speed_mmps >= STILL_MMPS;
-        self.looks.is_none_or(|l| l == looks)
+        self.looks.is_none_or(|kind| kind == kind_of(looks))
+            && self.colour.is_none_or(|colour| colour == colour_of(looks))
             && self.moving.is_none_or(|m| m == is_moving)
             && speed_mmps >= self.faster_mmps
     }
@@ -134,6 +173,13 @@ impl Criterion {
             let text = "what is still is no faster than anything; leave one of both out";
             return Err(("faster_than_m_s", text.to_owned()));
         }
+        if self.looks.is_some_and(|kind| kind >= COLOURED) {
+            return Err(("kind", format!("expected less than {COLOURED}")));
+        }
+        let colours = 1..=u8::MAX / COLOURED;
+        if self.colour.is_some_and(|colour| !colours.contains(&colour)) {
+            return Err(("colour", format!("expected 1 to {}", u8::MAX / COLOURED)));
+        }
         if !(1..=AT_MOST_MAX).contains(&self.at_most) {
             let text = format!("expected 1 to {AT_MOST_MAX}");
             return Err(("at_most", text));
@@ -147,6 +193,10 @@ impl Criterion {
     /// Folds it into the hash of a mission.
     pub(crate) fn hash(&self, h: &mut Fnv) {
         h.write_i64(self.looks.map_or(-1, i64::from));
+        if let Some(colour) = self.colour {
+            h.write_i64(-11);
+            h.write_i64(i64::from(colour));
+        }
         h.write_i64(self.moving.map_or(-1, i64::from));
         h.write_i64(i64::from(self.faster_mmps));
         h.write_i64(i64::from(self.then == Then::Follow));
@@ -181,6 +231,33 @@ mod tests {
     }
 
     #[test]
+    fn a_criterion_asks_for_a_colour() {
+        let red = Criterion {
+            looks: Some(1),
+            colour: Some(4),
+            ..Criterion::default()
+        };
+        assert!(red.fits(coloured(1, 4), 0) && red.check().is_ok());
+        // A car of another colour, of none that could be told, and what is no car.
+        for looks in [coloured(1, 5), coloured(1, 0), coloured(2, 4)] {
+            assert!(!red.fits(looks, 0), "{}", looks_name(looks));
+        }
+        let any = Criterion {
+            looks: Some(1),
+            ..Criterion::default()
+        };
+        assert!(any.fits(coloured(1, 4), 0) && any.fits(1, 0));
+        assert_eq!(looks_name(coloured(1, 4)), "red car");
+        assert_eq!(looks_name(coloured(6, 9)), "vehicle of kind 6 of colour 9");
+        let hash = |c: &Criterion| {
+            let mut h = Fnv::new();
+            c.hash(&mut h);
+            h.finish()
+        };
+        assert_ne!(hash(&red), hash(&any));
+    }
+
+    #[test]
     fn what_makes_no_sense_is_named() {
         let wrong = |change: fn(&mut Criterion)| {
             let mut c = Criterion::default();
@@ -192,6 +269,8 @@ mod tests {
         assert_eq!(wrong(|c| c.for_ms = 1_000), "then");
         assert_eq!(wrong(|c| c.at_most = 0), "at_most");
         assert_eq!(wrong(|c| c.worth = 0), "worth");
+        assert_eq!(wrong(|c| c.colour = Some(0)), "colour");
+        assert_eq!(wrong(|c| c.looks = Some(9)), "kind");
         assert_eq!(
             wrong(|c| (c.moving, c.faster_mmps) = (Some(false), 1)),
             "faster_than_m_s"

@@ -957,7 +957,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 47] = [
+        let changes: [fn(&mut Mission); 48] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -995,6 +995,14 @@ mod tests {
                     ..Criterion::default()
                 };
                 m.detections.push(car);
+            },
+            |m| {
+                let red = Criterion {
+                    looks: Some(1),
+                    colour: Some(4),
+                    ..Criterion::default()
+                };
+                m.detections.push(red);
             },
             |m| m.tasks.push(escort(0)),
             |m| m.tasks.push(escort(1)),

@@ -1,7 +1,7 @@
 //! What a mission looks for besides what it is to see, and what follows when that is seen
 //! (D2.7 §1.2.3, §3.7).
 
-use super::vehicles::looks;
+use super::vehicles::{colour, looks};
 use skein_interop::json::{Error, Node};
 use skein_peer::criteria::{AT_MOST, AT_MOST_MAX, CRITERIA_MAX, Criterion, Then, WORTH};
 use skein_peer::mission::mm;
@@ -25,6 +25,7 @@ pub(crate) fn of_mission(mission: &Node<'_>) -> Result<Vec<Criterion>, Error> {
 fn criterion(node: &Node<'_>) -> Result<Criterion, Error> {
     let f = node.fields(&[
         "kind",
+        "colour",
         "moving",
         "faster_than_m_s",
         "then",
@@ -41,6 +42,7 @@ fn criterion(node: &Node<'_>) -> Result<Criterion, Error> {
     };
     let criterion = Criterion {
         looks: f.get("kind").map(looks).transpose()?,
+        colour: f.get("colour").map(colour).transpose()?,
         moving: f.get("moving").map(Node::flag).transpose()?,
         faster_mmps: length_mm("faster_than_m_s", 60.0, "m/s")?,
         then,
@@ -69,12 +71,13 @@ mod tests {
     #[test]
     fn criteria_are_read_or_refused_with_place_and_remedy() {
         let read = with(
-            "{ detections: [{ kind: 'car', moving: true, faster_than_m_s: 4.5, then: 'follow', for_s: 300, stand_off_m: 30 }, { kind: 3, moving: false, then: 'notify', at_most: 2 }] }",
+            "{ detections: [{ kind: 'car', moving: true, faster_than_m_s: 4.5, then: 'follow', for_s: 300, stand_off_m: 30 }, { kind: 3, colour: 'red', moving: false, then: 'notify', at_most: 2 }] }",
         );
         let read = read.unwrap();
         assert_eq!((read[0].looks, read[0].faster_mmps), (Some(1), 4_500));
         assert_eq!((read[0].then, read[0].for_ms), (Then::Follow, 300_000));
         assert_eq!((read[1].looks, read[1].at_most), (Some(3), 2));
+        assert_eq!((read[0].colour, read[1].colour), (None, Some(4)));
         for (text, why) in [
             ("{ detections: [{ kind: 'car' }] }", "then"),
             (
@@ -91,8 +94,12 @@ mod tests {
                 "is not followed",
             ),
             (
-                "{ detections: [{ then: 'notify', colour: 'red' }] }",
-                "colour",
+                "{ detections: [{ then: 'notify', colour: 'yelow' }] }",
+                "no vehicle is \"yelow\"; did you mean yellow?",
+            ),
+            (
+                "{ detections: [{ then: 'notify', size: 'large' }] }",
+                "size",
             ),
         ] {
             let said = with(text).unwrap_err();

@@ -9,7 +9,7 @@ use skein_netsim::pursuit::KINDS;
 use skein_netsim::pursuit::roads::Roads;
 use skein_netsim::pursuit::vehicle::Behaviour;
 use skein_netsim::spec::VehicleSpec;
-use skein_peer::criteria::LOOKS;
+use skein_peer::criteria::{COLOURS, LOOKS, coloured};
 use std::sync::Arc;
 
 /// The usual speed of a vehicle unless the file says so, m/s.
@@ -44,6 +44,7 @@ pub(crate) fn read(
             "speed_mps",
             "does",
             "kind",
+            "colour",
             "confused",
         ])?;
         if let Some(list) = f.get("places_m") {
@@ -166,8 +167,21 @@ pub(super) fn looks(node: &Node<'_>) -> Result<u8, Error> {
     Ok(u8::try_from(kind).unwrap_or(KIND))
 }
 
+/// The colour of a vehicle by its name, from 1 on.
+pub(super) fn colour(node: &Node<'_>) -> Result<u8, Error> {
+    let name = node.text()?;
+    let found = COLOURS.iter().position(|c| *c == name);
+    let found = found.and_then(|n| u8::try_from(n + 1).ok());
+    found.ok_or_else(|| {
+        let known = suggestion(name, &COLOURS);
+        node.wrong(format!("no vehicle is \"{name}\"; {known}"))
+    })
+}
+
 fn kind(f: &Fields<'_>) -> Result<u8, Error> {
-    f.get("kind").map_or(Ok(KIND), looks)
+    let kind = f.get("kind").map_or(Ok(KIND), looks)?;
+    let colour = f.get("colour").map_or(Ok(0), colour)?;
+    Ok(coloured(kind, colour))
 }
 
 fn does(node: &Node<'_>) -> Result<Behaviour, Error> {

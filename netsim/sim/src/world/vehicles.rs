@@ -18,6 +18,7 @@ use skein_flight::tracking::estimate::Detection;
 use skein_geometry::frame::Point;
 use skein_geometry::math::seconds;
 use skein_geometry::random::{SplitMix64, mix};
+use skein_peer::criteria::{COLOURS, colour_of, coloured, kind_of};
 use skein_peer::mission::mm;
 use std::sync::Arc;
 
@@ -163,9 +164,20 @@ impl VehicleSpec {
         if random.unit() >= f64::from(self.confused_permille) / 1000.0 {
             return self.kind;
         }
-        let other = 1 + random.below(usize::from(KINDS) - 1);
-        u8::try_from((usize::from(self.kind) + other) % usize::from(KINDS)).unwrap_or(self.kind)
+        let (kind, colour) = (kind_of(self.kind), colour_of(self.kind));
+        // Of what has a colour that may be what is taken for another one.
+        if colour > 0 && random.unit() < 0.5 {
+            return coloured(kind, other_than(colour - 1, COLOURS.len(), &mut random) + 1);
+        }
+        let other = other_than(kind, usize::from(KINDS), &mut random);
+        coloured(other, colour)
     }
+}
+
+/// Another one of so many.
+fn other_than(this: u8, of: usize, random: &mut SplitMix64) -> u8 {
+    let other = 1 + random.below(of - 1);
+    u8::try_from((usize::from(this) + other) % of).unwrap_or(this)
 }
 
 fn sighted(at: Point, told: &Detection, kind: u8) -> Sighted {

@@ -107,7 +107,11 @@ pub(super) const DETECTION: &[Place] = &[
     ),
     at("by", "who named it as a target", U16),
     at("number", "its how-manieth target that was", U32),
-    at("looks", "what it looks like", U8),
+    at(
+        "looks",
+        "its kind and eight times its colour, 0 for none that could be told",
+        U8,
+    ),
     at(
         "seen_ms",
         "when it was seen, ms of the clock of percepts",

@@ -102,7 +102,11 @@ const SPREAD: Shape = Shape::Number(1, SPREAD_MAX_E3 as i128);
 pub(super) const TARGET: &[Place] = &[
     at("by", "who named it", U16),
     at("number", "its how-manieth target that was", U32),
-    at("looks", "what it looks like", U8),
+    at(
+        "looks",
+        "its kind and eight times its colour, 0 for none that could be told",
+        U8,
+    ),
     at(
         "seen_ms",
         "when it was seen last, ms of the clock of percepts",
