@@ -10,6 +10,7 @@ use crate::process::{Processes, Used};
 use crate::registry::{ConsoleEntry, private_file};
 use crate::stream::{Heard, Line, Streams};
 use crate::transports::Transports;
+use serde::de::DeserializeOwned;
 use skein_behaviors::Setpoint;
 use skein_link::frame::ToWorld;
 use skein_link::{LinkNews, RadioCounters};
@@ -272,22 +273,15 @@ impl Peers {
                     runs: peer.runs(),
                 })
             }
-            ToWorld::Report(_) if silent => None,
-            ToWorld::Report(bytes) => match cbor4ii::serde::from_slice(&bytes) {
-                Ok(report) => Some(Said::Report { id, report }),
-                Err(cause) => {
-                    tracing::warn!(id, %cause, "a report cannot be read");
-                    None
-                }
-            },
-            ToWorld::Witness(_) if silent => None,
-            ToWorld::Witness(bytes) => match cbor4ii::serde::from_slice(&bytes) {
-                Ok(witness) => Some(Said::Witness { id, witness }),
-                Err(cause) => {
-                    tracing::warn!(id, %cause, "what a peer sees cannot be read");
-                    None
-                }
-            },
+            ToWorld::Report(_) | ToWorld::Witness(_) if silent => None,
+            ToWorld::Report(bytes) => {
+                let report = read(id, "a report", &bytes)?;
+                Some(Said::Report { id, report })
+            }
+            ToWorld::Witness(bytes) => {
+                let witness = read(id, "what a peer sees", &bytes)?;
+                Some(Said::Witness { id, witness })
+            }
             ToWorld::Radio(counters) => {
                 let (arrived, late) = peer.counted(counters);
                 (!silent).then_some(Said::Heard { arrived, late })
@@ -436,6 +430,13 @@ impl Peers {
     pub(crate) async fn close(self) {
         self.processes.end().await;
     }
+}
+
+/// What a peer's own crate wrote; a warning where it cannot be read.
+fn read<T: DeserializeOwned>(id: u16, what: &str, bytes: &[u8]) -> Option<T> {
+    cbor4ii::serde::from_slice(bytes)
+        .inspect_err(|cause| tracing::warn!(id, %cause, "{what} cannot be read"))
+        .ok()
 }
 
 #[cfg(test)]

@@ -1,9 +1,7 @@
 //! A UAV that flies past a site, and what it says of that some steps of the world later.
 
 use super::*;
-use crate::world::fixture::square;
-use skein_behaviors::setpoint::Launch;
-use skein_behaviors::{Setpoint, Side, Steer};
+use crate::world::fixture::{square, straight};
 use skein_geometry::frame::Vector;
 use skein_peer::count_site::{CountSite, Counted};
 use skein_peer::mission::mm;
@@ -89,21 +87,6 @@ impl Scene {
             ..Looked::default()
         };
         self.said.insert(self.now_ms + late_ms, looked);
-    }
-}
-
-fn straight(from_ms: u64) -> Setpoint {
-    Setpoint {
-        from_ms,
-        airspeed_mps: 13.0,
-        height_m: 45.0,
-        steps: vec![Steer {
-            turn_rate_radps: 0.0,
-            duration_ms: 1_000,
-        }],
-        loiter: Side::Left,
-        gimbal: Vec::new(),
-        launch: Launch::Stay,
     }
 }
 

@@ -4,6 +4,8 @@
 
 use crate::fault::{Fault, TimedFault};
 use crate::spec::{Building, GroundStationSpec, RadioSpec, Spec, StormSpec, TroubleSpec, UavSpec};
+use skein_behaviors::setpoint::Launch;
+use skein_behaviors::{Setpoint, Side, Steer};
 use skein_flight::airframe::{Airframe, CLIMB_MPS};
 use skein_flight::mount::Mount;
 use skein_geometry::Polygon;
@@ -227,5 +229,22 @@ fn ring_pose(share: f64) -> Pose {
         Pose::new(Point::new(m + 2.0 * w + h - s, m + h), PI)
     } else {
         Pose::new(Point::new(m, m + 2.0 * (w + h) - s), -FRAC_PI_2)
+    }
+}
+
+/// Straight on for a second at 13 m/s, 45 m high.
+#[must_use]
+pub fn straight(from_ms: u64) -> Setpoint {
+    Setpoint {
+        from_ms,
+        airspeed_mps: 13.0,
+        height_m: 45.0,
+        steps: vec![Steer {
+            turn_rate_radps: 0.0,
+            duration_ms: 1000,
+        }],
+        loiter: Side::Left,
+        gimbal: Vec::new(),
+        launch: Launch::Stay,
     }
 }

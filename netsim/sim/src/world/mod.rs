@@ -659,24 +659,9 @@ fn place_of(body: &Kinematic) -> Place {
 
 #[cfg(test)]
 mod tests {
+    use super::fixture::straight;
     use super::*;
-    use skein_behaviors::{Side, Steer};
     use skein_flight::coverage::ring::CellId;
-
-    fn straight(from_ms: u64) -> Setpoint {
-        Setpoint {
-            from_ms,
-            airspeed_mps: 13.0,
-            height_m: 45.0,
-            steps: vec![Steer {
-                turn_rate_radps: 0.0,
-                duration_ms: 1000,
-            }],
-            loiter: Side::Left,
-            gimbal: Vec::new(),
-            launch: skein_behaviors::setpoint::Launch::Stay,
-        }
-    }
 
     fn fly(step_ms: u64) -> World {
         let spec = fixture::square(4);
