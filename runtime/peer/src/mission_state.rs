@@ -724,9 +724,27 @@ impl MissionState {
         };
         match old {
             Some(old) if old.loop_hash() == new.loop_hash() => new.keep_on(old),
-            _ => timers.stop(Timer::HeldCells),
+            old => {
+                timers.stop(Timer::HeldCells);
+                if let Some(old) = old {
+                    new.keep_promises(old.executive.as_ref(), old.separation);
+                }
+            }
         }
         new
+    }
+
+    /// What others were promised is flown on whatever else changes, and what they said counts.
+    fn keep_promises(&mut self, flew: Option<&Executive>, before: Option<Separation>) {
+        let (Some(executive), Some(flew)) = (&mut self.executive, flew) else {
+            return;
+        };
+        if let Some(before) = before
+            && let Some(new) = self.separation.take()
+        {
+            let _ = executive.take_over(flew);
+            self.separation = Some(new.after(before, executive));
+        }
     }
 
     /// On the same loop sections and rounds stay what they are, so that a revision which
@@ -752,6 +770,8 @@ impl MissionState {
             self.relay = old.relay;
             self.goal = old.goal;
             self.replan = old.replan;
+        } else {
+            self.keep_promises(old.executive.as_ref(), old.separation);
         }
     }
 }

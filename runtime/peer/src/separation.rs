@@ -121,6 +121,28 @@ impl Separation {
         }
     }
 
+    /// The same for a mission that goes before, with all that was promised and heard in it.
+    pub fn after(mut self, before: Self, executive: &Executive) -> Self {
+        let apart = self.apart(executive);
+        self.conflicts = before.conflicts.map(|known| known.under(apart));
+        Self {
+            me: self.me,
+            rules: self.rules,
+            airframe: self.airframe,
+            conflicts: self.conflicts,
+            offered: None,
+            is_news: true,
+            search_from_ms: 0,
+            ..before
+        }
+    }
+
+    /// What others were promised that this UAV flies, at a time.
+    pub fn promised(&self, now_ms: u64) -> Option<MotionPlan> {
+        let flown = self.conflicts.as_ref()?.in_force();
+        (!flown.has_left(now_ms)).then(|| flown.plan().clone())
+    }
+
     /// A life of this peer begins.
     pub fn begin_life(&mut self, me: Member) {
         self.me = me;
@@ -215,12 +237,13 @@ impl Separation {
         self.conflicts = Some(conflicts);
     }
 
-    fn begun(&self, percept: &Percept, executive: &Executive, motion: Motion) -> Conflicts {
+    /// How it is kept apart from others.
+    fn apart(&self, executive: &Executive) -> Apart {
         let reach = Reach {
             promised_m: executive.reach_m(self.rules.fastest_mps),
             fastest_mps: self.rules.fastest_mps,
         };
-        let apart = Apart {
+        Apart {
             detours: Detours {
                 airframe: self.airframe,
                 separation_m: self.rules.separation_m,
@@ -228,7 +251,11 @@ impl Separation {
             tubes_m: self.rules.tubes_m,
             circle_radius_m: self.rules.turn_radius_m,
             reach: Some(reach),
-        };
+        }
+    }
+
+    fn begun(&self, percept: &Percept, executive: &Executive, motion: Motion) -> Conflicts {
+        let apart = self.apart(executive);
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

@@ -663,6 +663,7 @@ mod tests {
             loiter: Side::Left,
             gimbal: Vec::new(),
             launch: skein_behaviors::setpoint::Launch::Stay,
+            promised: None,
         }
     }
 

@@ -176,6 +176,14 @@ impl Conflicts {
         self
     }
 
+    /// The same by other rules from now on. What is on offer was looked for by those before.
+    #[must_use]
+    pub fn under(mut self, apart: Apart) -> Self {
+        let _ = self.promises.withdraw();
+        self.apart = apart;
+        self
+    }
+
     /// What is to be flown.
     #[must_use]
     pub fn in_force(&self) -> &Motion {
