@@ -57,7 +57,7 @@ const REFILL_S: f64 = 5.5;
 
 /// The circle of the contingency is flown with this many times the least radius, so that
 /// following it has authority on both sides.
-const CIRCLE_RADII: f64 = 1.2;
+pub const CIRCLE_RADII: f64 = 1.2;
 
 /// What flying by promises needs to know.
 #[derive(Clone, Debug, PartialEq)]

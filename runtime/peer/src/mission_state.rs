@@ -472,6 +472,10 @@ impl MissionState {
         };
         let sections = &self.negotiation.sections;
         let is_open = |c: u16| !sections.covered().contains(c);
+        // Who stood still has been flown on by its airframe, as was promised.
+        let common_ms = self.separation.as_ref().map(|x| x.common_ms(s.now));
+        let flown_on = common_ms.and_then(|at_ms| executive.flown_on(at_ms));
+        let executive = flown_on.as_ref().unwrap_or(executive);
         let forecast = executive.forecast(open.round.wait_ms, &is_open);
         let is_planned = |c: &u16| sections.plan().iter().any(|p| p.cell == *c);
         let commits = forecast.cells.iter().copied().filter(is_planned);

@@ -12,10 +12,13 @@
 //! | the goal does not lead where the offer does | the offer is withdrawn |
 //! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after a second |
 //! | one who goes before is held up by this UAV, which gets no further itself, or anybody by one with nothing to do | a way aside is offered that lets them pass |
-//! | another UAV is believed down, for so long that it would have circled | it is in nobody's way |
+//! | another UAV is believed down, for so long that it would have circled, and not sensed where it promised to be | what it promised is in nobody's way |
+//! | one who is believed down is sensed, and does not circle | nothing near it is agreed (`silence`) |
+//! | another mission, other zones | what is in force stays; what is on offer is withdrawn |
 
 mod line;
 mod passing;
+mod silence;
 
 use crate::effect::{Effect, Effects};
 use crate::input::Time;
@@ -26,8 +29,8 @@ use crate::wire::message::{Member, Record};
 use crate::{Incarnation, PeerId};
 use line::Line;
 use passing::{Gist, Passing};
-use skein_behaviors::executive::promised::{Extension, PROMISED_MOST_S};
-use skein_behaviors::traffic::Sighting;
+use silence::{Silence, ends_ms};
+use skein_behaviors::executive::promised::{CIRCLE_RADII, Extension, PROMISED_MOST_S};
 use skein_behaviors::{Executive, Percept};
 use skein_flight::airframe::Airframe;
 use skein_flight::separation::{Detours, Motion, MotionPlan};
@@ -96,6 +99,7 @@ pub(crate) struct Separation {
     down_since: BTreeMap<u16, Time>,
     passing: Passing,
     line: Line,
+    silence: Silence,
 }
 
 impl Separation {
@@ -118,6 +122,7 @@ impl Separation {
             down_since: BTreeMap::new(),
             passing: Passing::default(),
             line: Line::default(),
+            silence: Silence::default(),
         }
     }
 
@@ -196,9 +201,19 @@ impl Separation {
         };
         let near = traffic.seen().map(|s| (PeerId(s.id), s.at()));
         conflicts.sensed(near, percept.time_ms);
-        let down = |s: &&Sighting| self.down_since.contains_key(&s.id);
-        let silent = traffic.seen().filter(down).map(|s| (PeerId(s.id), s.at()));
-        conflicts.are_silent(silent.collect());
+        let now_ms = percept.time_ms;
+        self.silence
+            .sense(traffic, conflicts, self.rules.tubes_m, now_ms);
+        let flown = conflicts.in_force();
+        let circles_since_ms = Some(ends_ms(flown)).filter(|ms| *ms <= now_ms);
+        let across_m = 2.0 * CIRCLE_RADII * self.rules.turn_radius_m + self.rules.tubes_m;
+        let silent = self.silence.silent(
+            (self.me.id, conflicts),
+            |id| self.down_since.contains_key(&id),
+            (circles_since_ms, across_m),
+            now_ms,
+        );
+        conflicts.are_silent(silent);
     }
 
     /// It is on the ground, and in nobody's way.
@@ -249,7 +264,7 @@ impl Separation {
                 separation_m: self.rules.separation_m,
             },
             tubes_m: self.rules.tubes_m,
-            circle_radius_m: self.rules.turn_radius_m,
+            circle_radius_m: CIRCLE_RADII * self.rules.turn_radius_m,
             reach: Some(reach),
         }
     }
@@ -434,14 +449,14 @@ impl Separation {
                 reason = "a constant of some seconds"
             )]
             let circled_ms = (PROMISED_MOST_S * 1e3) as u64;
-            if now.since_ms(since) >= circled_ms {
+            if now.since_ms(since) >= circled_ms && !self.silence.follows(id) {
                 conflicts.is_gone(PeerId(id));
             }
         }
     }
 
     /// The clock that all share, from the last percept on.
-    fn common_ms(&self, now: Time) -> u64 {
+    pub fn common_ms(&self, now: Time) -> u64 {
         let (then, at_ms) = self.clocks;
         at_ms + now.since_ms(then)
     }

@@ -4,6 +4,7 @@
 //! | what happens | what is flown |
 //! |---|---|
 //! | its computer stood still, and the airframe flew on as was promised | what is left of that |
+//! | the same, before the first percept | nothing; it is foretold from where it is by now |
 //! | the same, and the airframe is elsewhere | a circle from here, imposed |
 //! | a computer begins anew in an airframe that flies the promised circle | that circle, imposed |
 //! | another loop or other zones | what is in force; everything after what cannot be changed any more is asked for anew |
@@ -17,6 +18,9 @@ use crate::reactive::follow::{HORIZON_S, Offset};
 
 /// Airspeeds that differ by less are the same, m/s: rounding.
 const SAME_MPS: f64 = 1e-6;
+
+/// Who had no percept for so long stood still, milliseconds.
+const STILL_MS: u64 = 2_000;
 
 impl Executive {
     /// Whether it is so far from where it was to be that it does not follow any more.
@@ -38,6 +42,33 @@ impl Executive {
         self.track.skip_to(here_m);
         let offset = self.track.advance(&percept.pose, WINDOW_M);
         offset.filter(|_| !self.is_off(offset, percept.time_ms))
+    }
+
+    /// This executive as it would be had it not stood still since its last percept: where its
+    /// airframe has flown as was promised by now, milliseconds. `None` if it has not stood still.
+    #[must_use]
+    pub fn flown_on(&self, at_ms: u64) -> Option<Self> {
+        let last = self.played.as_ref()?.percept;
+        if self.contingency.is_none() || at_ms < last.time_ms + STILL_MS {
+            return None;
+        }
+        let mut on = self.clone();
+        let pose = self.on_track(self.scheduled_m(at_ms))?;
+        let here = Percept {
+            time_ms: at_ms,
+            pose,
+            ..last
+        };
+        let _ = on.goes_on(&here)?;
+        while on
+            .stretches
+            .front()
+            .is_some_and(|s| s.end_m <= on.track.at_m())
+        {
+            on.stretches.pop_front();
+        }
+        on.played.as_mut()?.percept = here;
+        Some(on)
     }
 
     /// Goes on with what was promised in the mission before, on other cells or between other
