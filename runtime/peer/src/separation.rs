@@ -58,6 +58,10 @@ const SAY_MS: u64 = 5_000;
 /// Two statements are at least so far apart, milliseconds.
 const SAY_LEAST_MS: u64 = 200;
 
+/// Of whom nothing was heard for so long nothing will be for a while, milliseconds: it says all
+/// that it flies every [`SAY_MS`].
+const UNHEARD_MS: u64 = 12_000;
+
 /// Versions of a life begin above those of the lives before it: more than any makes.
 const VERSIONS_OF_A_LIFE: u32 = 1 << 20;
 
@@ -100,6 +104,8 @@ pub(crate) struct Separation {
     passing: Passing,
     line: Line,
     silence: Silence,
+    /// When others were heard last, milliseconds of the common clock.
+    heard_ms: BTreeMap<u16, u64>,
 }
 
 impl Separation {
@@ -123,6 +129,7 @@ impl Separation {
             passing: Passing::default(),
             line: Line::default(),
             silence: Silence::default(),
+            heard_ms: BTreeMap::new(),
         }
     }
 
@@ -207,9 +214,14 @@ impl Separation {
         let flown = conflicts.in_force();
         let circles_since_ms = Some(ends_ms(flown)).filter(|ms| *ms <= now_ms);
         let across_m = 2.0 * CIRCLE_RADII * self.rules.turn_radius_m + self.rules.tubes_m;
+        for s in traffic.seen() {
+            self.heard_ms.entry(s.id).or_insert(now_ms);
+        }
+        let heard_ms = |id: u16| self.heard_ms.get(&id).copied().unwrap_or(now_ms);
+        let is_unheard = |id: u16| now_ms.saturating_sub(heard_ms(id)) >= UNHEARD_MS;
         let silent = self.silence.silent(
             (self.me.id, conflicts),
-            |id| self.down_since.contains_key(&id),
+            |id| self.down_since.contains_key(&id) || is_unheard(id),
             (circles_since_ms, across_m),
             now_ms,
         );
@@ -397,7 +409,7 @@ impl Separation {
             accepts: &intent.accepts,
         };
         self.passing.hear(now_ms, record, gist, hops);
-        let conflicts = self.of_present_life(author);
+        let conflicts = self.of_present_life(now, author);
         let news = conflicts.is_some_and(|c| c.hear(PeerId(author.id), intent, now_ms));
         self.is_news |= news;
     }
@@ -412,14 +424,14 @@ impl Separation {
             accepts: &brief.accepts,
         };
         self.passing.hear(now_ms, record, gist, hops);
-        let conflicts = self.of_present_life(author);
+        let conflicts = self.of_present_life(now, author);
         let news = conflicts.is_some_and(|c| c.hear_brief(PeerId(author.id), brief, now_ms));
         self.is_news |= news;
     }
 
     /// What is settled with others, if the author speaks in the last life known of it; what
     /// it said in an earlier one is void.
-    fn of_present_life(&mut self, author: Member) -> Option<&mut Conflicts> {
+    fn of_present_life(&mut self, now: Time, author: Member) -> Option<&mut Conflicts> {
         let conflicts = self.conflicts.as_mut()?;
         let known = self.lives.entry(author.id).or_insert(author.incarnation);
         if author.incarnation < *known {
@@ -431,6 +443,8 @@ impl Separation {
             self.passing.forget(author.id);
         }
         self.down_since.remove(&author.id);
+        let (then, at_ms) = self.clocks;
+        self.heard_ms.insert(author.id, at_ms + now.since_ms(then));
         Some(conflicts)
     }
 
@@ -450,7 +464,7 @@ impl Separation {
             )]
             let circled_ms = (PROMISED_MOST_S * 1e3) as u64;
             if now.since_ms(since) >= circled_ms && !self.silence.follows(id) {
-                conflicts.is_gone(PeerId(id));
+                conflicts.forget(PeerId(id));
             }
         }
     }

@@ -265,6 +265,11 @@ impl Conflicts {
         self.promises.forget_one(id);
     }
 
+    /// What another UAV said is of no meaning any more; it may be near all the same.
+    pub fn forget(&mut self, id: PeerId) {
+        self.promises.forget_one(id);
+    }
+
     /// Another UAV is in nobody's way any more.
     pub fn is_gone(&mut self, id: PeerId) {
         self.promises.forget_one(id);

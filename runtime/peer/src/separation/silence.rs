@@ -1,4 +1,5 @@
-//! Who is near and answers nothing: believed down, and sensed all the same (D2.7 §1.3).
+//! Who is near and answers nothing: believed down, or not heard for long, and sensed all the same
+//! (D2.7 §1.3).
 //!
 //! Its computer may be dead; then its airframe flies what it had promised and circles for ever.
 //! Or a partition is between the two, and it flies on by agreement with others, and takes this
@@ -87,17 +88,17 @@ impl Silence {
         watched.is_some_and(|w| w.fits_since_ms.is_some())
     }
 
-    /// Who of those believed down circles, seen by `me`, who has circled itself since a time if
+    /// Who of those who say nothing circles, seen by `me`, who has circled itself since a time if
     /// it does; circles are so wide, metres.
     pub fn silent(
         &self,
         (me, known): (u16, &Conflicts),
-        down: impl Fn(u16) -> bool,
+        says_nothing: impl Fn(u16) -> bool,
         (circles_since_ms, across_m): (Option<u64>, f64),
         now_ms: u64,
     ) -> Silent {
         let mut silent = Silent::default();
-        for (id, watched) in self.watched.iter().filter(|(id, _)| down(**id)) {
+        for (id, watched) in self.watched.iter().filter(|(id, _)| says_nothing(**id)) {
             let both_ms =
                 |since_ms: u64| now_ms.saturating_sub(since_ms.max(circles_since_ms.unwrap_or(0)));
             let waits_ms = match circles_since_ms {
