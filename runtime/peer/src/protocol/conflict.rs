@@ -697,6 +697,18 @@ mod tests {
         assert!(!g.is_proposing());
     }
 
+    #[test]
+    fn by_other_rules_what_is_in_force_stands_and_statements_go_on() {
+        let (mut a, _) = head_on();
+        assert!(a.tick(0) && a.is_proposing());
+        let (before, flown) = (a.intent(), a.in_force().clone());
+        let apart = a.apart;
+        let a = a.under(apart);
+        assert!(!a.is_proposing() && a.in_force() == &flown);
+        // Of a lower number it would not be heard.
+        assert!(a.intent().number > before.number);
+    }
+
     fn circle_at(there: [(PeerId, Point); 1]) -> Silent {
         Silent {
             all: there.iter().map(|(id, _)| *id).collect(),

@@ -144,3 +144,123 @@ impl Watched {
         Some((near.last()?.0, *at))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::conflict::{Apart, Intent, PromisedPlan};
+    use skein_behaviors::traffic::Sighting;
+    use skein_flight::separation::{Detours, End, MotionPlan, Stretch};
+    use skein_geometry::frame::Pose;
+
+    const ACROSS_M: f64 = 60.0;
+    const STRAY_M: f64 = 6.0;
+
+    /// A straight way of some metres and a circle, from a place on.
+    fn motion(north_m: f64, length_m: u32) -> Motion {
+        let airspeed_mmps = 12_000;
+        let way = Stretch {
+            radius_mm: 0,
+            length_mm: length_m * 1_000,
+            airspeed_mmps,
+        };
+        let end = End::Loiter {
+            radius_mm: 25_000,
+            airspeed_mmps,
+        };
+        let plan = MotionPlan::on_ground(0, Pose::new(Point::new(0.0, north_m), 0.0));
+        let stretches = vec![way];
+        Motion::new(MotionPlan {
+            stretches,
+            end,
+            ..plan
+        })
+        .unwrap()
+    }
+
+    fn knows(id: u16, said: &Motion) -> Conflicts {
+        let airframe = crate::testing::airframe();
+        let apart = Apart {
+            detours: Detours {
+                airframe,
+                separation_m: 30.0,
+            },
+            tubes_m: STRAY_M,
+            circle_radius_m: 25.0,
+            reach: None,
+        };
+        let mut known = Conflicts::new(PeerId(5), 3_000, apart, motion(900.0, 10));
+        let intent = Intent {
+            number: 1,
+            endurance_s: 3_000,
+            in_force: PromisedPlan {
+                version: 1,
+                plan: said.plan().clone(),
+            },
+            proposal: None,
+            accepts: Vec::new(),
+        };
+        let _ = known.hear(PeerId(id), &intent, 0);
+        known
+    }
+
+    /// From when on a silent UAV of a number, which flies like this and said `said`, counts as
+    /// one who circles, seen by the UAV 5, and whether where it promised.
+    fn counts_from(
+        id: u16,
+        said: &Motion,
+        flown: &Motion,
+        mine_ms: Option<u64>,
+    ) -> Option<(u64, bool)> {
+        let known = knows(id, said);
+        let mut silence = Silence::default();
+        for now_ms in (0..60_000).step_by(200) {
+            let at = flown.pose_at(now_ms).position();
+            #[allow(clippy::cast_possible_truncation)]
+            let dm = |m: f64| (m * 10.0).round() as i32;
+            let seen = Sighting {
+                id,
+                east_dm: dm(at.x),
+                north_dm: dm(at.y),
+                height_dm: 450,
+            };
+            let traffic = Traffic::new(900.0, [seen].into_iter());
+            silence.sense(&traffic, &known, STRAY_M, now_ms);
+            let mine_ms = mine_ms.filter(|ms| *ms <= now_ms);
+            let silent = silence.silent((5, &known), |_| true, (mine_ms, ACROSS_M), now_ms);
+            if silent.all.contains(&PeerId(id)) {
+                return Some((now_ms, silent.elsewhere.is_empty()));
+            }
+        }
+        None
+    }
+
+    #[test]
+    fn who_circles_at_the_end_of_what_it_promised_flies_that_for_ever() {
+        // It gets there after ten seconds.
+        let said = motion(0.0, 120);
+        assert_eq!(counts_from(9, &said, &said, Some(0)), Some((15_000, true)));
+        assert_eq!(counts_from(2, &said, &said, Some(0)), Some((19_000, true)));
+        // Who flies sees the other circle; who began to circle later waits from then on.
+        assert_eq!(counts_from(2, &said, &said, None), Some((15_000, true)));
+        assert_eq!(
+            counts_from(2, &said, &said, Some(13_000)),
+            Some((22_000, true))
+        );
+    }
+
+    #[test]
+    fn who_flies_on_elsewhere_lives() {
+        let (said, flown) = (motion(0.0, 120), motion(0.0, 900));
+        assert_eq!(counts_from(9, &said, &flown, Some(0)), None);
+    }
+
+    #[test]
+    fn who_stays_elsewhere_than_it_promised_circles_there() {
+        let (said, flown) = (motion(400.0, 10), motion(0.0, 10));
+        let (at_ms, as_promised) = counts_from(9, &said, &flown, Some(0)).unwrap();
+        assert!((15_000..17_000).contains(&at_ms) && !as_promised, "{at_ms}");
+        let (later_ms, _) = counts_from(2, &said, &flown, Some(0)).unwrap();
+        assert_eq!(later_ms, at_ms + 4_000);
+    }
+}

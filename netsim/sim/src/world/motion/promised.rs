@@ -53,3 +53,80 @@ impl Promised {
         begun.then(|| self.motion.loiter_per_m()).flatten()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::world::fixture::airframe;
+    use crate::world::motion::Kinematic;
+    use skein_behaviors::Setpoint;
+    use skein_flight::separation::{End, Motion, MotionPlan, Stretch};
+    use skein_geometry::frame::{Point, Pose};
+
+    fn plan() -> MotionPlan {
+        let stretch = |radius_mm, length_mm| Stretch {
+            radius_mm,
+            length_mm,
+            airspeed_mmps: 13_000,
+        };
+        let circle = End::Loiter {
+            radius_mm: 28_000,
+            airspeed_mmps: 13_000,
+        };
+        MotionPlan {
+            stretches: vec![stretch(0, 60_000), stretch(-25_000, 40_000)],
+            end: circle,
+            ..MotionPlan::on_ground(0, Pose::new(Point::new(0.0, 0.0), 0.4))
+        }
+    }
+
+    fn silent(promised: Option<MotionPlan>) -> Kinematic {
+        let start = Pose::new(Point::new(0.0, 0.0), 0.4);
+        let mut k = Kinematic::new(airframe(), start, 45.0, 0);
+        let setpoint = Setpoint {
+            from_ms: 0,
+            airspeed_mps: 13.0,
+            height_m: 45.0,
+            steps: vec![skein_behaviors::Steer {
+                turn_rate_radps: 0.0,
+                duration_ms: 2_500,
+            }],
+            loiter: skein_behaviors::Side::Left,
+            gimbal: Vec::new(),
+            launch: skein_behaviors::Launch::Stay,
+            promised,
+        };
+        assert!(k.apply(setpoint, 0));
+        k
+    }
+
+    #[test]
+    fn without_setpoints_it_flies_what_others_were_promised() {
+        let motion = Motion::new(plan()).unwrap();
+        let (mut k, mut other) = (silent(Some(plan())), silent(Some(plan())));
+        let mut circled = 0;
+        for at_ms in (0..120_000).step_by(500) {
+            k.advance(at_ms, &mut Vec::new());
+            let off_m = (k.position() - motion.pose_at(at_ms).position()).norm();
+            assert!(off_m < 1.0, "{off_m} m off at {at_ms} ms");
+            let seen = k.percept().unwrap();
+            assert_eq!(seen.failsafe, at_ms >= 1_000);
+            let on_it = seen
+                .circles_per_m
+                .is_some_and(|c| (c - 1.0 / 28.0).abs() < 1e-9);
+            assert_eq!(on_it, at_ms >= 7_693, "{at_ms}");
+            circled += usize::from(on_it);
+        }
+        assert!(circled > 200);
+        other.advance(119_500, &mut Vec::new());
+        assert_eq!(k.pose(), other.pose(), "however often it is asked");
+    }
+
+    #[test]
+    fn where_nobody_was_promised_anything_it_loiters_where_it_is() {
+        let mut k = silent(None);
+        k.advance(1_000, &mut Vec::new());
+        let at = k.position();
+        k.advance(60_000, &mut Vec::new());
+        assert!((k.position() - at).norm() < 40.0 && k.percept().unwrap().circles_per_m.is_none());
+    }
+}
