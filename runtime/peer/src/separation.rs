@@ -13,7 +13,7 @@
 //! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after a second |
 //! | one who goes before is held up by this UAV, which gets no further itself, or anybody by one with nothing to do | a way aside is offered that lets them pass |
 //! | another UAV is believed down, for so long that it would have circled, and not sensed where it promised to be | what it promised is in nobody's way |
-//! | one who is believed down is sensed, and does not circle | nothing near it is agreed (`silence`) |
+//! | one who says nothing is sensed, and does not circle | nothing near it is agreed (`silence`) |
 //! | another mission, other zones | what is in force stays; what is on offer is withdrawn |
 
 mod line;
@@ -172,7 +172,7 @@ impl Separation {
         self.clocks = (now, percept.time_ms);
         let now_ms = percept.time_ms;
         self.take_up(executive);
-        if executive.stands() {
+        if executive.stands() || self.conflicts.is_none() && percept.takes_off_in_ms > 0 {
             self.stand(percept, executive);
         }
         self.sense(percept);
@@ -228,7 +228,8 @@ impl Separation {
         conflicts.are_silent(silent);
     }
 
-    /// It is on the ground, and in nobody's way.
+    /// It is on the ground, and in nobody's way. In the line already it takes note of what others
+    /// say: who has to hear all of them once it is ready keeps those behind it waiting.
     fn stand(&mut self, percept: &Percept, executive: &Executive) {
         let Ok(nothing) = Motion::new(MotionPlan::on_ground(percept.time_ms, percept.pose)) else {
             return;
