@@ -172,7 +172,7 @@ impl Separation {
         self.clocks = (now, percept.time_ms);
         let now_ms = percept.time_ms;
         self.take_up(executive);
-        if executive.stands() || self.conflicts.is_none() && percept.takes_off_in_ms > 0 {
+        if executive.stands() {
             self.stand(percept, executive);
         }
         self.sense(percept);
@@ -228,8 +228,7 @@ impl Separation {
         conflicts.are_silent(silent);
     }
 
-    /// It is on the ground, and in nobody's way. In the line already it takes note of what others
-    /// say: who has to hear all of them once it is ready keeps those behind it waiting.
+    /// It is on the ground, and in nobody's way.
     fn stand(&mut self, percept: &Percept, executive: &Executive) {
         let Ok(nothing) = Motion::new(MotionPlan::on_ground(percept.time_ms, percept.pose)) else {
             return;

@@ -224,7 +224,7 @@ mod tests {
                 north_dm: dm(at.y),
                 height_dm: 450,
             };
-            let traffic = Traffic::new(900.0, [seen].into_iter());
+            let traffic = Traffic::new(900.0, [seen]);
             silence.sense(&traffic, &known, STRAY_M, now_ms);
             let mine_ms = mine_ms.filter(|ms| *ms <= now_ms);
             let silent = silence.silent((5, &known), |_| true, (mine_ms, ACROSS_M), now_ms);
