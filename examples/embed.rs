@@ -156,6 +156,7 @@ impl Uav {
             takes_off_in_ms: 0,
             launch_ready: false,
             failsafe: false,
+            circles_per_m: None,
             traffic: Traffic::default(),
             sightings: Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),

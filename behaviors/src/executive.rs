@@ -433,6 +433,7 @@ impl Executive {
             loiter: Side::Left,
             gimbal: Vec::new(),
             launch: crate::setpoint::Launch::Stay,
+            promised: None,
         }
     }
 

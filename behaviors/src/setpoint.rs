@@ -4,6 +4,7 @@
 //! arrives late does not shift what is flown, and percepts may be seldom.
 
 use serde::{Deserialize, Serialize};
+use skein_flight::separation::{Motion, MotionPlan};
 
 /// A side of the UAV.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -87,4 +88,16 @@ pub struct Setpoint {
     /// What it is told while it stands ready to be launched; of no meaning in the air.
     #[serde(default, skip_serializing_if = "Launch::is_stay")]
     pub launch: Launch,
+    /// What others were promised that it flies, where they were: what the airframe flies for want
+    /// of newer setpoints, instead of the failsafe loiter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub promised: Option<MotionPlan>,
+}
+
+impl Setpoint {
+    /// What others were promised, if it is something that can be flown.
+    #[must_use]
+    pub fn promise(&self) -> Option<Motion> {
+        Motion::new(self.promised.clone()?).ok()
+    }
 }

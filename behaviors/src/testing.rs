@@ -47,6 +47,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         takes_off_in_ms: 0,
         launch_ready: false,
         failsafe: false,
+        circles_per_m: None,
         traffic: crate::traffic::Traffic::default(),
         sightings: crate::sightings::Sightings::default(),
         contour: crate::contour::ContourLook::default(),

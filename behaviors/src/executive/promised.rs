@@ -24,6 +24,7 @@
 //! places at most, and a proof of clearance for each stretch.
 
 mod extensions;
+mod held;
 mod launcher;
 
 use super::transit::{CellVisit, Move, Place};
@@ -56,7 +57,7 @@ const REFILL_S: f64 = 5.5;
 
 /// The circle of the contingency is flown with this many times the least radius, so that
 /// following it has authority on both sides.
-const CIRCLE_RADII: f64 = 1.2;
+pub const CIRCLE_RADII: f64 = 1.2;
 
 /// What flying by promises needs to know.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,10 +148,13 @@ impl Executive {
         mut events: Vec<Event>,
     ) -> (Setpoint, Vec<Event>) {
         self.report_seen(percept, is_open, &mut events);
-        let offset = self.progress(percept);
+        let mut offset = self.progress(percept);
         let scheduled = self.contingency.as_ref().and_then(|c| c.schedule);
-        if self.replan && (offset.is_none() || scheduled.is_none() || self.is_lost(offset)) {
-            self.impose(percept);
+        if scheduled.is_none() || self.is_off(offset, percept.time_ms) {
+            offset = self.goes_on(percept);
+            if offset.is_none() {
+                self.impose(percept);
+            }
         }
         self.replan = false;
         self.count_promised_misses(is_open, &mut events);
@@ -221,10 +225,12 @@ impl Executive {
             pose: percept.pose,
             boundary: None,
         };
-        let bend_per_m = match self.transit.stay(&at) {
+        // Where its airframe flies a circle that others were promised, that stays.
+        let promised_per_m = percept.circles_per_m.filter(|_| percept.failsafe);
+        let bend_per_m = promised_per_m.unwrap_or_else(|| match self.transit.stay(&at) {
             Move::Loiter(circle) => circle.curvature_per_m,
             _ => 1.0 / self.circle_radius_m(),
-        };
+        });
         let schedule = Some((self.track.at_m(), percept.time_ms));
         let goals = self.contingency.as_ref().map_or(0, |c| c.goals + 1);
         self.contingency = Some(Contingency {

@@ -379,6 +379,7 @@ mod tests {
             loiter: Side::Left,
             gimbal: Vec::new(),
             launch: crate::setpoint::Launch::Stay,
+            promised: None,
         }
     }
 

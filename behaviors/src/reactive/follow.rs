@@ -168,6 +168,12 @@ impl Track {
         })
     }
 
+    /// Moves the progress on to an arc length.
+    pub fn skip_to(&mut self, at_m: f64) {
+        self.at_m = at_m.clamp(self.at_m, self.end_m.max(self.at_m));
+        self.forget();
+    }
+
     /// Drops pieces that are wholly behind.
     fn forget(&mut self) {
         while self.segments.len() > 1 {

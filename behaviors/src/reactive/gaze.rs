@@ -162,6 +162,7 @@ mod tests {
             loiter: Side::Left,
             gimbal: Vec::new(),
             launch: crate::setpoint::Launch::Stay,
+            promised: None,
         }
     }
 

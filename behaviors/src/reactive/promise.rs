@@ -51,5 +51,6 @@ pub fn fly(motion: &Motion, percept: &Percept, airframe: &Airframe, height_m: f6
         loiter: Side::Right,
         gimbal: Vec::new(),
         launch: crate::setpoint::Launch::Stay,
+        promised: None,
     }
 }

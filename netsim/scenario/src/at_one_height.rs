@@ -1,24 +1,30 @@
 //! The default mission with all UAVs at one height, against the same with heights of their own.
 
 use skein_netsim::Prepared;
-use skein_netsim::runs::{Wanted, run};
+use skein_netsim::runs::{Wanted, failure_free_makespan_ms, faults_of, run};
 
-/// The default mission without faults, of eight that begin like this, on a radio that carries
-/// statements too; seconds until all is seen.
-fn seen_s(begin: &str, fleet: &str, seed: u64) -> f64 {
+/// The default mission without faults of its own, of eight that begin like this, on a radio of
+/// so many bits a second.
+fn mission(begin: &str, fleet: &str, rate_bps: u32) -> Prepared {
     let text = crate::builtin::text("helsinki").unwrap();
     let begins = text.find("\n  faults: [").unwrap();
     let ends = begins + text[begins..].find("\n  ],").unwrap();
     let text = format!("{}\n  faults: [{}", &text[..begins], &text[ends..])
         .replace("slot_step_m: 5,", fleet)
         .replace("launch: \"base\"", begin)
-        .replace("rate_bps: 64000", "rate_bps: 250000")
+        .replace("rate_bps: 64000", &format!("rate_bps: {rate_bps}"))
+        .replace("max_uavs: 12", "max_uavs: 8")
         .replace("min_separation_m: 10", "min_separation_m: 0");
     let spec = crate::parse("helsinki.json5", &text, &crate::builtin::files()).unwrap();
     let prepared = Prepared::new(spec);
-    let faults = prepared.spec.faults.clone();
-    assert!(faults.is_empty());
-    let outcome = run(&prepared, seed, faults, Wanted::default());
+    assert!(prepared.spec.faults.is_empty());
+    prepared
+}
+
+/// Seconds until all is seen, on a radio that carries statements too.
+fn seen_s(begin: &str, fleet: &str, seed: u64) -> f64 {
+    let prepared = mission(begin, fleet, 250_000);
+    let outcome = run(&prepared, seed, Vec::new(), Wanted::default());
     let broken = outcome.violations();
     let reasons = &outcome.report.reasons;
     assert!(outcome.report.passed, "{seed}: {reasons:?} {broken:?}");
@@ -26,6 +32,30 @@ fn seen_s(begin: &str, fleet: &str, seed: u64) -> f64 {
     #[allow(clippy::cast_precision_loss, reason = "some minutes")]
     let seen_s = seen_ms as f64 / 1e3;
     seen_s
+}
+
+/// In storms that once brought two of them nearer than they are to keep.
+fn keeps_apart_in_storms(begin: &str, seeds: &[u64]) {
+    let prepared = mission(begin, "separation_m: 30,", 1_000_000);
+    let free_ms = failure_free_makespan_ms(&prepared);
+    for seed in seeds {
+        let (struck, faults) = faults_of(&prepared, *seed, Some(free_ms));
+        let outcome = run(&struck, *seed, faults, Wanted::default());
+        let broken = outcome.violations();
+        assert!(broken.iter().all(|v| v.check != "S1"), "{seed}: {broken:?}");
+    }
+}
+
+/// A computer dies (9000), one stands still (9007), a partition (9003, 9047).
+#[test]
+fn who_took_off_at_one_place_keep_apart_in_storms() {
+    keeps_apart_in_storms("launch: \"base\"", &[9000, 9003, 9007, 9047]);
+}
+
+/// Partitions.
+#[test]
+fn who_began_in_the_air_keep_apart_in_storms() {
+    keeps_apart_in_storms("launch: \"spread\"", &[7011, 7031, 7039, 7042]);
 }
 
 /// By agreement, and by heights of their own: the mean of some seeds, seconds.

@@ -197,6 +197,12 @@ pub fn setpoint_hash(s: &Setpoint) -> u64 {
             (h ^ q(step.turn_rate_radps) ^ (u64::from(step.duration_ms) << 40))
                 .wrapping_mul(0x9E37_79B9_7F4A_7C15)
         });
+    let turns = s.promised.iter().fold(turns, |h, plan| {
+        let ends = plan.stretches.iter().map(|p| u64::from(p.length_mm));
+        ends.fold(h ^ plan.start_ms.rotate_left(20), |h, mm| {
+            (h ^ mm).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        })
+    });
     s.gimbal.iter().fold(turns, |h, step| {
         (h ^ q(step.roll_rad) ^ q(step.pitch_rad).rotate_left(24))
             .wrapping_mul(0x9E37_79B9_7F4A_7C15)

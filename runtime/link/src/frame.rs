@@ -151,7 +151,8 @@ fn check_percept(p: &Percept) -> Result<(), FrameError> {
         p.endurance_s,
     ];
     let turned = p.attitude.is_none_or(|a| a.is_finite());
-    if turned && values.iter().all(|v| v.is_finite()) {
+    let circles = p.circles_per_m.is_none_or(|c| c.is_finite() && c != 0.0);
+    if turned && circles && values.iter().all(|v| v.is_finite()) {
         Ok(())
     } else {
         Err(FrameError::OutOfBounds("percept"))
@@ -165,6 +166,9 @@ fn check_setpoint(s: &Setpoint) -> Result<(), FrameError> {
         && s.gimbal.iter().all(GimbalStep::is_finite);
     if !finite {
         return Err(FrameError::OutOfBounds("setpoint"));
+    }
+    if s.promised.is_some() && s.promise().is_none() {
+        return Err(FrameError::OutOfBounds("promise of the setpoint"));
     }
     if s.steps.len() > MAX_STEPS {
         return Err(FrameError::OutOfBounds("steps of the setpoint"));
@@ -267,6 +271,7 @@ mod tests {
             loiter: Side::Left,
             gimbal: Vec::new(),
             launch: skein_behaviors::setpoint::Launch::Stay,
+            promised: None,
         })
     }
 

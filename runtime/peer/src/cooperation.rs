@@ -259,15 +259,18 @@ impl Cooperation {
             return Effects::new();
         };
         let is_open = |c: u16| !sections.covered().contains(c);
-        let (setpoint, events) = executive.step(percept, &is_open);
+        let (mut setpoint, events) = executive.step(percept, &is_open);
         self.trails.note(self.id, executive.take_traced());
-        let mut effects = vec![Effect::Fly(setpoint)];
+        let mut effects = Effects::new();
         if aims_anew {
             effects.push(Effect::Negotiate);
         }
         if let Some(separation) = &mut state.separation {
             effects.extend(separation.on_percept(now, percept, executive, &is_open));
+            // Told to the airframe no later than to others.
+            setpoint.promised = separation.promised(percept.time_ms);
         }
+        effects.insert(0, Effect::Fly(setpoint));
         for event in events {
             match event {
                 Event::Sighted { seen, of } => {

@@ -472,6 +472,10 @@ impl MissionState {
         };
         let sections = &self.negotiation.sections;
         let is_open = |c: u16| !sections.covered().contains(c);
+        // Who stood still has been flown on by its airframe, as was promised.
+        let common_ms = self.separation.as_ref().map(|x| x.common_ms(s.now));
+        let flown_on = common_ms.and_then(|at_ms| executive.flown_on(at_ms));
+        let executive = flown_on.as_ref().unwrap_or(executive);
         let forecast = executive.forecast(open.round.wait_ms, &is_open);
         let is_planned = |c: &u16| sections.plan().iter().any(|p| p.cell == *c);
         let commits = forecast.cells.iter().copied().filter(is_planned);
@@ -724,9 +728,27 @@ impl MissionState {
         };
         match old {
             Some(old) if old.loop_hash() == new.loop_hash() => new.keep_on(old),
-            _ => timers.stop(Timer::HeldCells),
+            old => {
+                timers.stop(Timer::HeldCells);
+                if let Some(old) = old {
+                    new.keep_promises(old.executive.as_ref(), old.separation);
+                }
+            }
         }
         new
+    }
+
+    /// What others were promised is flown on whatever else changes, and what they said counts.
+    fn keep_promises(&mut self, flew: Option<&Executive>, before: Option<Separation>) {
+        let (Some(executive), Some(flew)) = (&mut self.executive, flew) else {
+            return;
+        };
+        if let Some(before) = before
+            && let Some(new) = self.separation.take()
+        {
+            let _ = executive.take_over(flew);
+            self.separation = Some(new.after(before, executive));
+        }
     }
 
     /// On the same loop sections and rounds stay what they are, so that a revision which
@@ -752,6 +774,8 @@ impl MissionState {
             self.relay = old.relay;
             self.goal = old.goal;
             self.replan = old.replan;
+        } else {
+            self.keep_promises(old.executive.as_ref(), old.separation);
         }
     }
 }

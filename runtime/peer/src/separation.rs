@@ -12,10 +12,13 @@
 //! | the goal does not lead where the offer does | the offer is withdrawn |
 //! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after a second |
 //! | one who goes before is held up by this UAV, which gets no further itself, or anybody by one with nothing to do | a way aside is offered that lets them pass |
-//! | another UAV is believed down, for so long that it would have circled | it is in nobody's way |
+//! | another UAV is believed down, for so long that it would have circled, and not sensed where it promised to be | what it promised is in nobody's way |
+//! | one who says nothing is sensed, and does not circle | nothing near it is agreed (`silence`) |
+//! | another mission, other zones | what is in force stays; what is on offer is withdrawn |
 
 mod line;
 mod passing;
+mod silence;
 
 use crate::effect::{Effect, Effects};
 use crate::input::Time;
@@ -26,8 +29,8 @@ use crate::wire::message::{Member, Record};
 use crate::{Incarnation, PeerId};
 use line::Line;
 use passing::{Gist, Passing};
-use skein_behaviors::executive::promised::{Extension, PROMISED_MOST_S};
-use skein_behaviors::traffic::Sighting;
+use silence::{Silence, ends_ms};
+use skein_behaviors::executive::promised::{CIRCLE_RADII, Extension, PROMISED_MOST_S};
 use skein_behaviors::{Executive, Percept};
 use skein_flight::airframe::Airframe;
 use skein_flight::separation::{Detours, Motion, MotionPlan};
@@ -54,6 +57,10 @@ const SAY_MS: u64 = 5_000;
 
 /// Two statements are at least so far apart, milliseconds.
 const SAY_LEAST_MS: u64 = 200;
+
+/// Of whom nothing was heard for so long nothing will be for a while, milliseconds: it says all
+/// that it flies every [`SAY_MS`].
+const UNHEARD_MS: u64 = 12_000;
 
 /// Versions of a life begin above those of the lives before it: more than any makes.
 const VERSIONS_OF_A_LIFE: u32 = 1 << 20;
@@ -96,6 +103,9 @@ pub(crate) struct Separation {
     down_since: BTreeMap<u16, Time>,
     passing: Passing,
     line: Line,
+    silence: Silence,
+    /// When others were heard last, milliseconds of the common clock.
+    heard_ms: BTreeMap<u16, u64>,
 }
 
 impl Separation {
@@ -118,7 +128,31 @@ impl Separation {
             down_since: BTreeMap::new(),
             passing: Passing::default(),
             line: Line::default(),
+            silence: Silence::default(),
+            heard_ms: BTreeMap::new(),
         }
+    }
+
+    /// The same for a mission that goes before, with all that was promised and heard in it.
+    pub fn after(mut self, before: Self, executive: &Executive) -> Self {
+        let apart = self.apart(executive);
+        self.conflicts = before.conflicts.map(|known| known.under(apart));
+        Self {
+            me: self.me,
+            rules: self.rules,
+            airframe: self.airframe,
+            conflicts: self.conflicts,
+            offered: None,
+            is_news: true,
+            search_from_ms: 0,
+            ..before
+        }
+    }
+
+    /// What others were promised that this UAV flies, at a time.
+    pub fn promised(&self, now_ms: u64) -> Option<MotionPlan> {
+        let flown = self.conflicts.as_ref()?.in_force();
+        (!flown.has_left(now_ms)).then(|| flown.plan().clone())
     }
 
     /// A life of this peer begins.
@@ -174,9 +208,24 @@ impl Separation {
         };
         let near = traffic.seen().map(|s| (PeerId(s.id), s.at()));
         conflicts.sensed(near, percept.time_ms);
-        let down = |s: &&Sighting| self.down_since.contains_key(&s.id);
-        let silent = traffic.seen().filter(down).map(|s| (PeerId(s.id), s.at()));
-        conflicts.are_silent(silent.collect());
+        let now_ms = percept.time_ms;
+        self.silence
+            .sense(traffic, conflicts, self.rules.tubes_m, now_ms);
+        let flown = conflicts.in_force();
+        let circles_since_ms = Some(ends_ms(flown)).filter(|ms| *ms <= now_ms);
+        let across_m = 2.0 * CIRCLE_RADII * self.rules.turn_radius_m + self.rules.tubes_m;
+        for s in traffic.seen() {
+            self.heard_ms.entry(s.id).or_insert(now_ms);
+        }
+        let heard_ms = |id: u16| self.heard_ms.get(&id).copied().unwrap_or(now_ms);
+        let is_unheard = |id: u16| now_ms.saturating_sub(heard_ms(id)) >= UNHEARD_MS;
+        let silent = self.silence.silent(
+            (self.me.id, conflicts),
+            |id| self.down_since.contains_key(&id) || is_unheard(id),
+            (circles_since_ms, across_m),
+            now_ms,
+        );
+        conflicts.are_silent(silent);
     }
 
     /// It is on the ground, and in nobody's way.
@@ -215,20 +264,25 @@ impl Separation {
         self.conflicts = Some(conflicts);
     }
 
-    fn begun(&self, percept: &Percept, executive: &Executive, motion: Motion) -> Conflicts {
+    /// How it is kept apart from others.
+    fn apart(&self, executive: &Executive) -> Apart {
         let reach = Reach {
             promised_m: executive.reach_m(self.rules.fastest_mps),
             fastest_mps: self.rules.fastest_mps,
         };
-        let apart = Apart {
+        Apart {
             detours: Detours {
                 airframe: self.airframe,
                 separation_m: self.rules.separation_m,
             },
             tubes_m: self.rules.tubes_m,
-            circle_radius_m: self.rules.turn_radius_m,
+            circle_radius_m: CIRCLE_RADII * self.rules.turn_radius_m,
             reach: Some(reach),
-        };
+        }
+    }
+
+    fn begun(&self, percept: &Percept, executive: &Executive, motion: Motion) -> Conflicts {
+        let apart = self.apart(executive);
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -355,7 +409,7 @@ impl Separation {
             accepts: &intent.accepts,
         };
         self.passing.hear(now_ms, record, gist, hops);
-        let conflicts = self.of_present_life(author);
+        let conflicts = self.of_present_life(now, author);
         let news = conflicts.is_some_and(|c| c.hear(PeerId(author.id), intent, now_ms));
         self.is_news |= news;
     }
@@ -370,14 +424,14 @@ impl Separation {
             accepts: &brief.accepts,
         };
         self.passing.hear(now_ms, record, gist, hops);
-        let conflicts = self.of_present_life(author);
+        let conflicts = self.of_present_life(now, author);
         let news = conflicts.is_some_and(|c| c.hear_brief(PeerId(author.id), brief, now_ms));
         self.is_news |= news;
     }
 
     /// What is settled with others, if the author speaks in the last life known of it; what
     /// it said in an earlier one is void.
-    fn of_present_life(&mut self, author: Member) -> Option<&mut Conflicts> {
+    fn of_present_life(&mut self, now: Time, author: Member) -> Option<&mut Conflicts> {
         let conflicts = self.conflicts.as_mut()?;
         let known = self.lives.entry(author.id).or_insert(author.incarnation);
         if author.incarnation < *known {
@@ -389,6 +443,8 @@ impl Separation {
             self.passing.forget(author.id);
         }
         self.down_since.remove(&author.id);
+        let (then, at_ms) = self.clocks;
+        self.heard_ms.insert(author.id, at_ms + now.since_ms(then));
         Some(conflicts)
     }
 
@@ -407,14 +463,14 @@ impl Separation {
                 reason = "a constant of some seconds"
             )]
             let circled_ms = (PROMISED_MOST_S * 1e3) as u64;
-            if now.since_ms(since) >= circled_ms {
-                conflicts.is_gone(PeerId(id));
+            if now.since_ms(since) >= circled_ms && !self.silence.follows(id) {
+                conflicts.forget(PeerId(id));
             }
         }
     }
 
     /// The clock that all share, from the last percept on.
-    fn common_ms(&self, now: Time) -> u64 {
+    pub fn common_ms(&self, now: Time) -> u64 {
         let (then, at_ms) = self.clocks;
         at_ms + now.since_ms(then)
     }

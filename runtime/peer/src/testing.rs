@@ -178,6 +178,7 @@ impl Seat {
             takes_off_in_ms: 0,
             launch_ready: false,
             failsafe: false,
+            circles_per_m: None,
             traffic: skein_behaviors::traffic::Traffic::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),

@@ -332,3 +332,97 @@ fn ways_aside_lead_away_and_end_in_a_circle() {
         assert!(Motion::new(way.plan).is_ok());
     }
 }
+
+/// Who flies what it promised, and a long while without a percept: its airframe flies on.
+fn stood_still() -> Flight {
+    let mut flight = Flight::new(true);
+    flight.fly(60);
+    assert_eq!(flight.imposed, 1);
+    flight.asked = None;
+    let at_ms = flight.wing.time_ms + 47_000;
+    let motion = flight.in_force.clone().unwrap();
+    assert!(motion.ends_at_s() * 1e3 < 107_000.0 && flight.wing.time_ms == 60_000);
+    flight.wing.time_ms = at_ms;
+    flight.wing.pose = motion.pose_at(at_ms);
+    flight
+}
+
+#[test]
+fn who_stood_still_goes_on_with_what_it_promised() {
+    let mut flight = stood_still();
+    let before = flight.in_force.clone();
+    flight.answer_ms = u64::MAX / 2;
+    flight.fly(30);
+    assert_eq!((flight.imposed, &flight.in_force), (1, &before));
+    flight.answer_ms = 400;
+    flight.asked = None;
+    flight.fly(1_500);
+    assert!(flight.done && flight.imposed == 1);
+}
+
+#[test]
+fn who_stood_still_knows_where_it_is_before_it_senses_that() {
+    let flight = stood_still();
+    let at_ms = flight.wing.time_ms;
+    let last_ms = 60_000;
+    assert!(flight.executive.flown_on(last_ms + 1_000).is_none());
+    let on = flight.executive.flown_on(at_ms).unwrap();
+    let here = on.here().unwrap().pose;
+    let off_m = (here.position() - flight.wing.pose.position()).norm();
+    assert!(off_m < 0.1, "{off_m} m");
+    let forecast = on.forecast(0, &|_| true);
+    let there = forecast.off_loop.unwrap().pose().position();
+    assert!((there - here.position()).norm() < 0.1);
+}
+
+#[test]
+fn who_stood_still_and_is_elsewhere_imposes_a_circle() {
+    let mut flight = stood_still();
+    flight.wing.pose.east_m += 20.0;
+    flight.fly(30);
+    assert_eq!(flight.imposed, 2);
+}
+
+#[test]
+fn another_mission_lets_what_was_promised_stand() {
+    let mut flight = Flight::new(true);
+    flight.fly(60);
+    flight.asked = None;
+    let before = flight.in_force.clone();
+    // Other cells, and a zone where it is not.
+    let zone = rectangle(400.0, 300.0, 40.0, 40.0);
+    let (coverage_loop, router) = loop_and_router(12, 10, vec![zone]);
+    let n = u16::try_from(coverage_loop.len()).unwrap();
+    let mut other = Executive::new(airframe(), 90.0, coverage_loop, router).with_promises();
+    assert!(other.take_over(&flight.executive));
+    assert!(!other.clone().take_imposed());
+    flight.executive = other;
+    flight.open = vec![true; usize::from(n)];
+    // Nobody answers: it is flown to its end, and then the circle.
+    flight.answer_ms = u64::MAX / 2;
+    flight.legs(0, n);
+    flight.fly(40);
+    assert_eq!((flight.imposed, &flight.in_force), (1, &before));
+    flight.answer_ms = 400;
+    flight.asked = None;
+    flight.fly(100);
+    assert!(flight.imposed == 1 && flight.open.iter().any(|open| !open));
+}
+
+#[test]
+fn a_computer_that_begins_anew_flies_on_the_circle_of_its_airframe() {
+    let mut flight = Flight::new(true);
+    let circle_m = 31.0;
+    let percept = Percept {
+        failsafe: true,
+        circles_per_m: Some(-1.0 / circle_m),
+        ..flight.wing.percept()
+    };
+    let _ = flight.executive.step(&percept, &|_| true);
+    assert!(flight.executive.take_imposed());
+    let End::Loiter { radius_mm, .. } = flight.executive.in_force(percept.time_ms).unwrap().end
+    else {
+        panic!("no circle");
+    };
+    assert_eq!(radius_mm, -31_000);
+}

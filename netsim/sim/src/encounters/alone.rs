@@ -38,6 +38,7 @@ pub(super) fn decide(flyers: &mut [Flyer], range_m: f64, now_ms: u64) {
             loiter: Side::Right,
             gimbal: Vec::new(),
             launch: skein_behaviors::setpoint::Launch::Stay,
+            promised: None,
         };
         let _ = f.body.apply(setpoint, now_ms);
     }

@@ -300,6 +300,7 @@ impl Flyer {
             loiter: Side::Left,
             gimbal: Vec::new(),
             launch: skein_behaviors::setpoint::Launch::Stay,
+            promised: None,
         };
         self.body.apply(setpoint, now_ms);
     }

@@ -384,6 +384,7 @@ mod tests {
             airspeed_mps: 13.0,
             height_m: 45.0,
             launch: skein_behaviors::Launch::Stay,
+            promised: None,
             steps: Vec::new(),
             loiter: Side::Left,
             gimbal: vec![

@@ -246,5 +246,6 @@ pub fn straight(from_ms: u64) -> Setpoint {
         loiter: Side::Left,
         gimbal: Vec::new(),
         launch: Launch::Stay,
+        promised: None,
     }
 }

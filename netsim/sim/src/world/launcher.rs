@@ -147,6 +147,7 @@ impl Launchers {
             place.is_ready = false;
             self.rolling.push((u.id, at_ms));
             u.body.stand_until(at_ms);
+            u.body.promise(said);
         }
     }
 }
@@ -206,6 +207,7 @@ mod tests {
             loiter: Side::Left,
             gimbal: Vec::new(),
             launch,
+            promised: None,
         };
         let _ = w.apply(uav, setpoint);
     }

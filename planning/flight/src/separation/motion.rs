@@ -222,6 +222,15 @@ impl Motion {
         seconds(self.plan.start_ms)
     }
 
+    /// The circle in which it ends, 1/m, positive to the left; `None` where it leaves.
+    #[must_use]
+    pub fn loiter_per_m(&self) -> Option<f64> {
+        match self.plan.end {
+            End::Loiter { radius_mm, .. } => Some(curvature_per_m(radius_mm)),
+            End::Leaves => None,
+        }
+    }
+
     /// Whether it has left the airspace at this time.
     #[must_use]
     pub fn has_left(&self, at_ms: u64) -> bool {

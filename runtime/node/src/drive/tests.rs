@@ -376,6 +376,7 @@ async fn a_percept_becomes_a_setpoint_that_answers_it() {
             loiter: Side::Left,
             gimbal: Vec::new(),
             launch: skein_behaviors::setpoint::Launch::Stay,
+            promised: None,
         })],
         _ => Vec::new(),
     });

@@ -94,6 +94,7 @@ fn percept(time_ms: u64) -> Percept {
         takes_off_in_ms: 0,
         launch_ready: false,
         failsafe: false,
+        circles_per_m: None,
         traffic: skein_behaviors::traffic::Traffic::default(),
         sightings: skein_behaviors::sightings::Sightings::default(),
     }

@@ -106,6 +106,15 @@ pub struct Reach {
     pub fastest_mps: f64,
 }
 
+/// Those who answer nothing, circle, and need not be asked.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Silent {
+    /// All of them.
+    pub all: BTreeSet<PeerId>,
+    /// Those of them who circle elsewhere than they promised, where they are.
+    pub elsewhere: BTreeMap<PeerId, Point>,
+}
+
 /// Whom a UAV lets pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InTheWay {
@@ -147,8 +156,8 @@ pub struct Conflicts {
     search_from_ms: u64,
     /// Where the others were seen last, whether or not they said what they fly.
     seen: BTreeMap<PeerId, Sighting>,
-    /// Who is near and answers nothing, where.
-    silent: BTreeMap<PeerId, Point>,
+    /// Who is near and answers nothing.
+    silent: Silent,
 }
 
 impl Conflicts {
@@ -164,7 +173,7 @@ impl Conflicts {
             lead_ms: LEAD_FIRST_MS,
             search_from_ms: 0,
             seen: BTreeMap::new(),
-            silent: BTreeMap::new(),
+            silent: Silent::default(),
         }
     }
 
@@ -173,6 +182,14 @@ impl Conflicts {
     pub fn after(mut self, before: u32) -> Self {
         let (rank, flown) = (self.promises.rank(), self.promises.in_force().clone());
         self.promises = Promises::after(before, rank, flown);
+        self
+    }
+
+    /// The same by other rules from now on. What is on offer was looked for by those before.
+    #[must_use]
+    pub fn under(mut self, apart: Apart) -> Self {
+        let _ = self.promises.withdraw();
+        self.apart = apart;
         self
     }
 
@@ -238,13 +255,18 @@ impl Conflicts {
             .collect();
     }
 
-    /// These answer nothing, and circle where they are.
-    pub fn are_silent(&mut self, others: BTreeMap<PeerId, Point>) {
+    /// These answer nothing, and circle.
+    pub fn are_silent(&mut self, others: Silent) {
         self.silent = others;
     }
 
     /// Another UAV begins anew: what it said before is void.
     pub fn begins_anew(&mut self, id: PeerId) {
+        self.promises.forget_one(id);
+    }
+
+    /// What another UAV said is of no meaning any more; it may be near all the same.
+    pub fn forget(&mut self, id: PeerId) {
         self.promises.forget_one(id);
     }
 
@@ -347,7 +369,7 @@ impl Conflicts {
         let least_m = self.apart.detours.separation_m + self.apart.tubes_m;
         let circle_m = 2.0 * self.apart.circle_radius_m;
         let off = |at: &Point| motion.nearest_to_m(*at, now_ms) >= least_m + circle_m;
-        self.silent.values().all(off)
+        self.silent.elsewhere.values().all(off)
     }
 
     fn held_up(&self, now_ms: u64, of: InTheWay) -> impl Iterator<Item = Motion> {
@@ -400,7 +422,7 @@ impl Conflicts {
         let far = |id: &&PeerId| !self.is_asked(**id, now_ms);
         let far: BTreeSet<PeerId> = self.seen.keys().filter(far).copied().collect();
         // Who is seen and has not said what it flies cannot be asked yet.
-        let is_silent = |id: &PeerId| self.silent.contains_key(id);
+        let is_silent = |id: &PeerId| self.silent.all.contains(id);
         let strangers = self
             .seen
             .keys()
@@ -676,17 +698,36 @@ mod tests {
     }
 
     #[test]
+    fn by_other_rules_what_is_in_force_stands_and_statements_go_on() {
+        let (mut a, _) = head_on();
+        assert!(a.tick(0) && a.is_proposing());
+        let (before, flown) = (a.intent(), a.in_force().clone());
+        let apart = a.apart;
+        let a = a.under(apart);
+        assert!(!a.is_proposing() && a.in_force() == &flown);
+        // Of a lower number it would not be heard.
+        assert!(a.intent().number > before.number);
+    }
+
+    fn circle_at(there: [(PeerId, Point); 1]) -> Silent {
+        Silent {
+            all: there.iter().map(|(id, _)| *id).collect(),
+            elsewhere: there.into_iter().collect(),
+        }
+    }
+
+    #[test]
     fn who_fell_silent_since_has_not_accepted() {
         let (mut a, _) = head_on();
         assert!(a.tick(0) && a.is_proposing());
         let before = a.in_force().clone();
         let there = [(PeerId(2), Point::new(0.0, 0.0))];
         a.sensed(there.into_iter(), 200);
-        a.are_silent(there.into_iter().collect());
+        a.are_silent(circle_at(there));
         let _ = a.tick(400);
         assert_eq!(a.in_force(), &before, "it circles where this would fly");
         let aside = [(PeerId(2), Point::new(0.0, 900.0))];
-        a.are_silent(aside.into_iter().collect());
+        a.are_silent(circle_at(aside));
         let _ = a.tick(600);
         assert_ne!(a.in_force(), &before);
     }

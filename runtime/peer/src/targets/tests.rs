@@ -35,6 +35,7 @@ fn percept(now_ms: u64, at: Point, seen: &[(f64, f64, u8)]) -> Percept {
         takes_off_in_ms: 0,
         launch_ready: false,
         failsafe: false,
+        circles_per_m: None,
         traffic: skein_behaviors::traffic::Traffic::default(),
     }
 }

@@ -5,6 +5,7 @@
 //! A leg is a circular arc or a line from an anchor pose. The pose at any time comes
 //! from the anchor in closed form, so it does not depend on how often somebody asked.
 
+use super::promised::Promised;
 use crate::world::camera::{Camera, Eye, Picture};
 use skein_behaviors::setpoint::GimbalStep;
 use skein_behaviors::{Percept, Setpoint, Side};
@@ -143,6 +144,8 @@ pub struct Kinematic {
     failsafe: bool,
     /// The circle of the failsafe, once begun in a wind.
     hold: Option<Hold>,
+    /// What it flies for want of setpoints, if others were promised its flight.
+    promised: Option<Promised>,
     lost: Option<Loss>,
     camera: Camera,
 }
@@ -167,6 +170,7 @@ impl Kinematic {
             },
             fuel_ms: endurance_ms(&airframe),
             setpoint: None,
+            promised: None,
             fresh_until_ms: now_ms + FAILSAFE_MS,
             failsafe: false,
             hold: None,
@@ -297,6 +301,7 @@ impl Kinematic {
             takes_off_in_ms: 0,
             launch_ready: false,
             failsafe: self.failsafe,
+            circles_per_m: self.circles_per_m(),
             traffic: skein_behaviors::traffic::Traffic::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
@@ -328,8 +333,20 @@ impl Kinematic {
         }
         self.fresh_until_ms = fresh_until_ms;
         self.camera.take(&setpoint);
+        self.promise(&setpoint);
         self.setpoint = Some(setpoint);
         true
+    }
+
+    /// What others were promised that it flies, from now on.
+    pub fn promise(&mut self, setpoint: &Setpoint) {
+        self.promised = Promised::of(setpoint);
+    }
+
+    /// The promised circle, if it flies that for want of setpoints.
+    fn circles_per_m(&self) -> Option<f64> {
+        let promised = self.promised.as_ref().filter(|_| self.failsafe)?;
+        promised.circles_per_m(self.now_ms)
     }
 
     /// Whether the last setpoint that it took still flies it.
@@ -390,8 +407,9 @@ impl Kinematic {
     /// Turn rate and airspeed from now on, within the limits, and until when.
     fn command(&mut self) -> (f64, f64, u64) {
         self.failsafe = self.now_ms >= self.fresh_until_ms;
-        if self.failsafe {
-            return self.loiter();
+        let waits = self.setpoint.is_none() && self.promised.is_some();
+        if self.failsafe || waits {
+            return self.fly_alone();
         }
         self.hold = None;
         let Some(s) = &self.setpoint else {
@@ -412,6 +430,21 @@ impl Kinematic {
             speed,
             until_ms.min(self.fresh_until_ms),
         )
+    }
+
+    /// Without setpoints: what others were promised, in the still air for which it was; else the
+    /// failsafe loiter.
+    fn fly_alone(&mut self) -> (f64, f64, u64) {
+        let is_calm = self.leg.wind.speed_mps() <= 0.0;
+        let before = (self.leg.turn_rate_radps, self.leg.speed_mps);
+        if let Some(here) = self.percept().filter(|_| is_calm)
+            && let Some(promised) = &mut self.promised
+        {
+            let (rate, speed, until_ms) = promised.command(&here, &self.airframe, before);
+            let limit = self.max_rate(speed);
+            return (rate.clamp(-limit, limit), speed, until_ms);
+        }
+        self.loiter()
     }
 
     /// The failsafe: the sharpest turn at cruise, in a wind a circle over the ground.
@@ -537,6 +570,7 @@ mod tests {
         let mut flown = Vec::new();
         let up = Setpoint {
             launch: skein_behaviors::Launch::Stay,
+            promised: None,
             from_ms: 0,
             airspeed_mps: 13.0,
             height_m: 51.0,
@@ -591,6 +625,7 @@ mod tests {
             loiter: Side::Right,
             gimbal: Vec::new(),
             launch: skein_behaviors::setpoint::Launch::Stay,
+            promised: None,
         }
     }
 
