@@ -100,7 +100,7 @@ fn who_answers_late_is_judged_by_what_was_in_its_picture_then() {
         scene.looks
     );
     scene.witnessed.end(10_000, &scene.world);
-    assert_eq!(scene.witnessed.broken(), [String::new(); 0]);
+    assert_eq!(scene.witnessed.broken(), Vec::<String>::new());
     let counts = scene.witnessed.counts(10_000);
     assert_eq!((counts.len(), &counts[0].name[..]), (1, "gate"));
     let least_ms = u64::from(scene.looks.0) * PERCEPT_MS / 4;

@@ -151,7 +151,7 @@ impl PeerLogic for Double {
             Input::Percept(percept) => Some(percept.time_ms),
             _ => None,
         };
-        let seen_ms = seen.inputs.iter().filter_map(percept).last()?;
+        let seen_ms = seen.inputs.iter().rev().find_map(percept)?;
         Some(Witness::Looked(Box::new(Looked {
             seen_ms,
             ..Looked::default()
