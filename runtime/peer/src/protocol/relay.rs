@@ -391,8 +391,9 @@ impl Relay {
 
     /// What this peer bids and claims itself goes before all else, once: nobody else can say
     /// it. Sent again it waits its turn, or what this peer has seen would never be said.
-    /// Where many share the channel its coverage goes next: claims that others wrote and that
-    /// wait for longer than coverage lives would never let it go.
+    /// Where many share the channel its coverage goes next, elsewhere once half of its lifetime is
+    /// over: claims that others wrote and that wait for longer than coverage lives would never
+    /// let it go.
     fn standing(&self, key: &RecordKey, priority: Priority) -> Standing {
         let unsaid = || self.held.get(key).is_some_and(|h| h.copies == 0);
         match priority {

@@ -14,21 +14,13 @@ pub const MAX_QUEUE: usize = 128;
 pub(super) enum Standing {
     /// Nobody else can say it, and it was not said yet.
     First,
-    /// This peer's coverage: it goes before the rest where many share the channel.
+    /// This peer's coverage: it goes before the rest where many share the channel, and where
+    /// half of its lifetime is over.
     Coverage,
     /// Its turn comes when it is due.
     Due,
 }
 
-impl Standing {
-    fn rank(self, crowded: bool) -> u8 {
-        match self {
-            Self::First => 0,
-            Self::Coverage if crowded => 1,
-            Self::Coverage | Self::Due => 2,
-        }
-    }
-}
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Waiting {
@@ -40,12 +32,35 @@ pub(super) struct Waiting {
     pub(super) standing: Standing,
 }
 
+impl Waiting {
+    fn rank(&self, now: Time, crowded: bool) -> u8 {
+        match self.standing {
+            Standing::First => 0,
+            Standing::Coverage if crowded || self.presses_at() <= now => 1,
+            Standing::Coverage | Standing::Due => 2,
+        }
+    }
+
+    /// When half of its lifetime is over. Where what others wrote waits for longer than coverage
+    /// lives, all of it is due sooner, and coverage would never go.
+    fn presses_at(&self) -> Time {
+        self.from.plus_ms(self.until.since_ms(self.from) / 2)
+    }
+
+    /// When it may go, or presses, if that is to come.
+    fn changes_at(&self, now: Time) -> Option<Time> {
+        let presses = (self.standing == Standing::Coverage).then(|| self.presses_at());
+        let times = [Some(self.from), presses].into_iter().flatten();
+        times.filter(|t| *t > now).min()
+    }
+}
+
 /// Whose turn it is among those that have waited for their random time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Turn {
     /// None where all still wait.
     pub(super) first: Option<(RecordKey, Priority)>,
-    /// When the random time of another one is over.
+    /// When the random time of another one is over, or coverage begins to press.
     pub(super) next: Time,
     crowded: bool,
 }
@@ -169,7 +184,7 @@ impl Queue {
         let known = self.turn.get();
         let known = known.filter(|t| now < t.next && t.crowded == crowded);
         let turn = known.unwrap_or_else(|| {
-            let later = self.waiting.values().map(|w| w.from).filter(|t| *t > now);
+            let later = self.waiting.values().filter_map(|w| w.changes_at(now));
             Turn {
                 first: self.first(now, crowded, |_| false),
                 next: later.min().unwrap_or(Time(u64::MAX)),
@@ -189,7 +204,7 @@ impl Queue {
     ) -> Option<(RecordKey, Priority)> {
         let may_go = |(k, w): &(&RecordKey, &Waiting)| w.from <= now || rides(k);
         let goes = self.waiting.iter().filter(may_go);
-        goes.min_by_key(|(k, w)| (w.from > now, w.standing.rank(crowded), w.due, **k))
+        goes.min_by_key(|(k, w)| (w.from > now, w.rank(now, crowded), w.due, **k))
             .map(|(k, w)| (*k, w.priority))
     }
 }
@@ -231,8 +246,7 @@ mod tests {
             kept += u32::from(queue.turn.get().is_some());
             let turn = queue.turn(now, crowded);
             assert_eq!(turn.first, queue.first(now, crowded, |_| false));
-            let later = queue.waiting.values().map(|w| w.from);
-            let next = later.filter(|from| *from > now).min();
+            let next = queue.waiting.values().filter_map(|w| w.changes_at(now)).min();
             assert_eq!(turn.next, next.unwrap_or(Time(u64::MAX)));
             assert_eq!(queue.n_pieces(), queue.pieces().len());
             let least = queue.waiting.values().map(|w| w.until).min();
