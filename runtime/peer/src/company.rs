@@ -149,8 +149,11 @@ fn elsewhere(
     before: &BTreeMap<u16, Time>,
 ) -> BTreeMap<u16, Time> {
     let is_elsewhere = |id: &u16| {
-        let info = s.membership.info(*id);
-        info.is_some_and(|i| i.is_own_word && !i.ground_station && i.loop_hash != loop_hash)
+        let info = s
+            .membership
+            .info(*id)
+            .filter(|i| i.is_own_word && !i.ground_station);
+        info.is_some_and(|i| i.loop_hash != 0 && i.loop_hash != loop_hash)
     };
     let there = live.keys().copied().filter(is_elsewhere);
     there

@@ -303,7 +303,7 @@ impl Membership {
 
     /// A claim of this life that is new here names the revision and the loop of its author:
     /// beacons are heard one hop away only, and who is farther is known to have left a loop by
-    /// nothing else.
+    /// nothing else. Of whom nothing is known yet it says nothing: who claims need not be able.
     pub fn on_claim(
         &mut self,
         now: Time,
@@ -312,7 +312,8 @@ impl Membership {
     ) {
         self.noting(now, author, |m| {
             let known = m.known.get_mut(&author);
-            if let Some(known) = known.filter(|k| k.freshest.incarnation == incarnation) {
+            let known = known.filter(|k| k.freshest.incarnation == incarnation);
+            if let Some(known) = known.filter(|k| k.info.loop_hash != 0) {
                 known.info.revision = revision;
                 known.info.loop_hash = loop_hash;
                 known.info.is_own_word = true;

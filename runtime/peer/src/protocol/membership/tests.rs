@@ -202,6 +202,7 @@ fn on_which_loop_somebody_works_its_own_word_tells_before_that_of_others() {
     let tells_of_four = |heartbeat| on(7, heartbeat, vec![entry(4, 20 + heartbeat, 1, None)]);
     let loop_of = |m: &Membership, id| m.info(id).map(|i| i.loop_hash);
     // Who never spoke itself is on the loop of whoever tells that it is able.
+    m.on_claim(Time(0), (4, 1), (3, 8));
     m.on_beacon(Time(0), 9, 1, &tells_of_four(1));
     assert_eq!(loop_of(&m, 4), Some(7));
     // Its claim comes over several hops; what others tell says nothing any more.
