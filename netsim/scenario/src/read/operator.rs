@@ -201,33 +201,6 @@ mod tests {
         crate::parse_with("s.json5", &text, &files, &over).map_err(|e| e.to_string())
     }
 
-    /// Straight passes over an area, and a zone that leaves a notch between itself and another one,
-    /// from which no curve leads on: a person is told before anybody flies.
-    #[test]
-    fn a_zone_that_cuts_off_pieces_of_straight_passes_is_refused() {
-        let zone = "zone: { circle: { east_m: 246, north_m: 281.8, radius_m: 20 } }";
-        let schedule = format!("operator: [{{ at_s: 60, nfz_add: {{ id: 'a', {zone} }} }}],");
-        let text = include_str!("../../../../configs/trials/gimbal.json5");
-        let exactly = |schedule: &str| {
-            let instead = [
-                ("seed: 1,", format!("seed: 1, planner: 'exact', {schedule}")),
-                ("spacing_m: 84", "spacing_m: 72".to_owned()),
-                ("min_coverable: 0.95", "min_coverable: 0.8".to_owned()),
-                ("fov_across_deg: 99.2", "fov_across_deg: 104".to_owned()),
-                ("fov_along_deg: 88.4", "fov_along_deg: 98".to_owned()),
-            ];
-            let text = instead.iter().fold(text.to_owned(), |text, (from, to)| {
-                assert!(text.contains(from), "{from}");
-                text.replacen(from, to, 1)
-            });
-            let (files, over) = (Files::Directory(PathBuf::new()), Overrides::default());
-            crate::parse_with("s.json5", &text, &files, &over).map_err(|e| e.to_string())
-        };
-        assert!(exactly("").is_ok());
-        let said = exactly(&schedule).unwrap_err();
-        assert!(said.contains("the planner finds no way to"), "{said}");
-    }
-
     #[test]
     fn a_schedule_is_read_and_what_is_wrong_is_named_with_its_place() {
         let zone = "zone: { circle: { east_m: 300, north_m: 250, radius_m: 30 } }";
