@@ -18,7 +18,6 @@
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
 //! | this peer's own bid, claim or order | it was sent, and nobody is heard passing it on | sent again, twice at most |
 //! | waiting | the share allows it, it is this peer's own bid or claim and was not sent yet, or nothing is due earlier | sent |
-//! | this peer's coverage, waiting | more than twelve share the channel; or some was dropped unsaid, and none has had its turn since | it goes before what is due sooner |
 //! | waiting for its random time | something is sent, one transmission holds both, and more than twelve share the channel | sent with it |
 //! | waiting | its lifetime is over, or the queue is full of what is more urgent | not sent |
 //!
@@ -392,9 +391,8 @@ impl Relay {
 
     /// What this peer bids and claims itself goes before all else, once: nobody else can say
     /// it. Sent again it waits its turn, or what this peer has seen would never be said.
-    /// Where many share the channel its coverage goes next, and elsewhere once some was dropped
-    /// unsaid: claims that others wrote and that wait for longer than coverage lives would never
-    /// let it go.
+    /// Where many share the channel its coverage goes next: claims that others wrote and that
+    /// wait for longer than coverage lives would never let it go.
     fn standing(&self, key: &RecordKey, priority: Priority) -> Standing {
         let unsaid = || self.held.get(key).is_some_and(|h| h.copies == 0);
         match priority {
@@ -679,7 +677,7 @@ impl Relay {
         if lent.is_none() && !self.air.pay(now, held.bytes.len()) {
             return None;
         }
-        self.queue.take(now, &key);
+        self.queue.remove(&key);
         held.lack = 0;
         held.sent = now;
         held.copies = held.copies.saturating_add(1);

@@ -14,18 +14,17 @@ pub const MAX_QUEUE: usize = 128;
 pub(super) enum Standing {
     /// Nobody else can say it, and it was not said yet.
     First,
-    /// This peer's coverage: it goes before the rest where many share the channel, and where it
-    /// would not go at all.
+    /// This peer's coverage: it goes before the rest where many share the channel.
     Coverage,
     /// Its turn comes when it is due.
     Due,
 }
 
 impl Standing {
-    fn rank(self, presses: bool) -> u8 {
+    fn rank(self, crowded: bool) -> u8 {
         match self {
             Self::First => 0,
-            Self::Coverage if presses => 1,
+            Self::Coverage if crowded => 1,
             Self::Coverage | Self::Due => 2,
         }
     }
@@ -58,9 +57,6 @@ pub(super) struct Queue {
     /// Before this no lifetime is over.
     first_until: Time,
     pieces: usize,
-    /// This peer's coverage was dropped unsaid, and none has had its turn since: what others wrote
-    /// and waits for longer than coverage lives is due before all that is said now.
-    starves: bool,
     /// As it was last asked for; nothing where the queue changed since.
     turn: Cell<Option<Turn>>,
 }
@@ -71,7 +67,6 @@ impl Queue {
             waiting: BTreeMap::new(),
             first_until: Time(u64::MAX),
             pieces: 0,
-            starves: false,
             turn: Cell::new(None),
         }
     }
@@ -113,17 +108,6 @@ impl Queue {
         }
     }
 
-    /// One is sent.
-    pub(super) fn take(&mut self, now: Time, key: &RecordKey) {
-        if let Some(w) = self.waiting.get(key)
-            && w.standing == Standing::Coverage
-        {
-            let mut ripe = self.waiting.values().filter(|o| o.from <= now);
-            self.starves &= ripe.any(|o| o.standing == Standing::Due && o.due < w.due);
-        }
-        self.remove(key);
-    }
-
     /// All of one author are void.
     pub(super) fn remove_author(&mut self, author: u16) {
         let keys = self.waiting.keys().filter(|k| k.0 == author);
@@ -141,8 +125,6 @@ impl Queue {
         let over = self.waiting.iter().filter(|(_, w)| w.until < now);
         let over: Vec<RecordKey> = over.map(|(k, _)| *k).collect();
         for key in over {
-            let dropped = self.waiting.get(&key).map(|w| w.standing);
-            self.starves |= dropped == Some(Standing::Coverage);
             self.remove(&key);
         }
         let untils = self.waiting.values().map(|w| w.until);
@@ -205,10 +187,9 @@ impl Queue {
         crowded: bool,
         rides: impl Fn(&RecordKey) -> bool,
     ) -> Option<(RecordKey, Priority)> {
-        let presses = crowded || self.starves;
         let may_go = |(k, w): &(&RecordKey, &Waiting)| w.from <= now || rides(k);
         let goes = self.waiting.iter().filter(may_go);
-        goes.min_by_key(|(k, w)| (w.from > now, w.standing.rank(presses), w.due, **k))
+        goes.min_by_key(|(k, w)| (w.from > now, w.standing.rank(crowded), w.due, **k))
             .map(|(k, w)| (*k, w.priority))
     }
 }

@@ -297,43 +297,6 @@ fn own_coverage_waits_for_own_bids_and_claims_and_not_for_their_repetition() {
     assert_eq!(sent[3..].iter().filter(|k| **k == kinds[0]).count(), 2);
 }
 
-/// Nine share the channel, and claims that others wrote come faster than they can be passed on:
-/// each of them is due before coverage that is said after it came, and lives longer.
-#[test]
-fn own_coverage_that_was_dropped_once_goes_first_as_long_as_others_keep_it_waiting() {
-    let mut r = relay(2);
-    share(&mut r, 5_000, 9);
-    let (mut own, mut passed_on) = (0, 0);
-    for t in 5_000..65_000_u64 {
-        if t % 100 == 0 {
-            let author = 10 + u16::try_from(t / 100 % 40).unwrap();
-            let seq = u32::try_from(t).unwrap();
-            let claim = Record {
-                kind: Kind::Claim.number(),
-                ..record(author, seq)
-            };
-            r.offer(Time(t), &claim, &[0; 100], 0);
-        }
-        if t % 4_250 == 0 {
-            let cover = Record {
-                kind: Kind::Cover.number(),
-                ..record(2, u32::try_from(t).unwrap())
-            };
-            r.own(Time(t), &cover, vec![1; 160]);
-        }
-        while let Some(out) = r.poll(Time(t)) {
-            if out.bytes[0] == 1 {
-                own += 1;
-            } else {
-                passed_on += 1;
-            }
-        }
-    }
-    assert!(passed_on > 100, "{passed_on}");
-    // One had to be dropped before.
-    assert!(own >= 11, "own coverage was said {own} times of 14");
-}
-
 #[test]
 fn the_bucket_bounds_what_is_sent() {
     let mut r = relay(2);
