@@ -23,6 +23,8 @@ pub(crate) struct Present {
     pub members: Vec<Member>,
     /// How many of them were never heard of.
     pub unheard: usize,
+    /// Since when this peer knows by their own word that others of them work on another loop.
+    pub elsewhere: BTreeMap<u16, Time>,
     /// As it was numbered by the membership, for this peer, able or not; none where it is to
     /// be looked up again.
     of: Option<(u64, Member, bool)>,
@@ -114,11 +116,13 @@ impl Company {
         let members = members(s, &live, able, loop_hash);
         let unheard = self.add_expected(s, &mut live);
         let until = self.expected.values().min().copied();
+        let elsewhere = elsewhere(s, &live, loop_hash, &self.present.elsewhere);
         let is_changed = self.present.of.is_none() || live != self.present.live;
         self.present = Arc::new(Present {
             live,
             members,
             unheard,
+            elsewhere,
             of,
             alone: alone.clone(),
             until: until.unwrap_or(Time(u64::MAX)),
@@ -135,6 +139,26 @@ impl Company {
         live.extend(self.expected.keys().map(|id| (*id, FIRST_LIFE)));
         self.expected.len()
     }
+}
+
+/// Which live UAVs say that they work on another loop than this one, and since when that is known.
+fn elsewhere(
+    s: &Situation<'_>,
+    live: &LivePeers,
+    loop_hash: u64,
+    before: &BTreeMap<u16, Time>,
+) -> BTreeMap<u16, Time> {
+    let is_elsewhere = |id: &u16| {
+        let info = s
+            .membership
+            .info(*id)
+            .filter(|i| i.is_own_word && !i.ground_station);
+        info.is_some_and(|i| i.loop_hash != 0 && i.loop_hash != loop_hash)
+    };
+    let there = live.keys().copied().filter(is_elsewhere);
+    there
+        .map(|id| (id, before.get(&id).copied().unwrap_or(s.now)))
+        .collect()
 }
 
 /// Live UAVs on this loop whose beacon says able, this peer included if it is; ascending.

@@ -391,6 +391,7 @@ impl MissionState {
             live_changed,
             members: &present.members,
             unheard: present.unheard,
+            elsewhere: &present.elsewhere,
             diameter: s.membership.diameter(s.now),
             able_since: self.able_since,
             revision: self.revision(),

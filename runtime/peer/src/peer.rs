@@ -311,6 +311,11 @@ impl Peer {
                 if let Body::Bid(bid) = body {
                     self.diary.note_bid(self.now, record.author, bid);
                 }
+                if let Body::Claim(claim) = body {
+                    let author = (record.author, record.incarnation);
+                    let works_on = (claim.revision, claim.loop_hash);
+                    self.membership.on_claim(self.now, author, works_on);
+                }
                 let effects = self.cooperation.hear(self.now, (record, hops), body);
                 self.carry_out(effects);
             }

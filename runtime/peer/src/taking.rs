@@ -10,7 +10,7 @@ use crate::mission_state::{MissionState, speed_mmps};
 use crate::protocol::airtime::LASTING_INTERVALS;
 use crate::protocol::negotiation::{Context, SETTLE_INTERVALS};
 use crate::protocol::runs::{PlannedCell, cells_of, legs_of};
-use crate::protocol::sharing::{self, Hand, Owner, Pace, Site};
+use crate::protocol::sharing::{self, Hand, Owner, Pace, Site, Taken};
 use crate::wire::message::CellRun;
 use skein_behaviors::Percept;
 use skein_flight::coverage::ring::backtracking::Leg;
@@ -51,8 +51,8 @@ impl MissionState {
             return self.negotiation.begin_nearest(&cells, begins_ms);
         }
         if !may_relieve {
-            let (begins_ms, cells) = self.overdue_orphans((s, ctx), (&me, &others))?;
-            return self.negotiation.begin_nearest(&cells, begins_ms);
+            let runs = self.overdue_orphans((s, ctx), (&me, &others))?;
+            return self.negotiation.begin_each(&runs);
         }
         let hands = others.into_iter().filter(|h| h.free_ms == 0);
         let hands: Vec<Hand> = hands.chain([me]).collect();
@@ -92,23 +92,29 @@ impl MissionState {
     /// Orphans that nobody took who has nothing to fly, though it was the turn of each: for
     /// want of fuel, mostly. Whoever has something to fly takes them then, the one that would be
     /// there soonest first, however much that is: or they would wait for one that never comes.
+    /// What was seen in passing leaves short runs, and few may be left who can fly any: so one
+    /// takes of as many runs as make a share, each with when it would begin there.
     fn overdue_orphans(
         &self,
         (s, ctx): (&Situation<'_>, &Context<'_>),
         (me, others): (&Hand, &[Hand]),
-    ) -> Option<(u64, Vec<(u16, Direction)>)> {
+    ) -> Option<Vec<Taken>> {
         let overdue = self.negotiation.overdue_orphans(ctx);
         let (pace, share) = (self.pace()?, self.share_at_once(ctx));
-        let (begins_ms, cells) = sharing::nearest_orphans(&overdue.runs(), me, share, pace)?;
-        let first = cells.first()?.0;
         let at_work = others.iter().copied().filter(|h| h.free_ms > 0);
         let at_work: Vec<Hand> = at_work.collect();
-        let (sooner, _) = pace.how_many_sooner(me, (&at_work, 0), first);
-        if !self.negotiation.is_my_turn_at_last(ctx, first, sooner) {
-            return None;
+        let is_my_turn = |me: &Hand, first: u16| {
+            let (sooner, _) = pace.how_many_sooner(me, (&at_work, 0), first);
+            self.negotiation.is_my_turn_at_last(ctx, first, sooner)
+        };
+        let mut taken = sharing::share_of_orphans(overdue, me, share, pace, is_my_turn);
+        let all = taken.iter().flat_map(|(_, cells)| cells).copied().collect();
+        let flown = self.flown_besides(all, u64::MAX, s.percept)?;
+        for (_, cells) in &mut taken {
+            cells.retain(|cell| flown.contains(cell));
         }
-        let cells = self.flown_besides(cells, u64::MAX, s.percept)?;
-        Some((begins_ms, cells))
+        taken.retain(|(_, cells)| !cells.is_empty());
+        Some(taken)
     }
 
     /// The other members, where and when each has nothing to fly any more, as far as is known:

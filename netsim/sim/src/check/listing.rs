@@ -24,6 +24,8 @@ pub type Version = (u32, u32);
 struct Orphan {
     since_ms: u64,
     owner: Option<u16>,
+    /// Who of the dead is taken for its owner by somebody who is to list it.
+    claimant: Option<u16>,
     told: bool,
 }
 
@@ -35,6 +37,9 @@ pub struct ListingCheck {
     roster: Vec<Planned>,
     orphans: BTreeMap<u16, Orphan>,
     last_lister: BTreeMap<u16, u16>,
+    /// Who of the dead, before anybody knew of its death, was heard to plan it by somebody who is
+    /// to list it.
+    claimed_by_dead: BTreeMap<u16, u16>,
     able_since_ms: Option<u64>,
     heard: BTreeMap<(u16, u16), (Arc<Claim>, Version)>,
     clashes: Clocks<(u16, u16, u16)>,
@@ -133,6 +138,7 @@ impl ListingCheck {
         }
         let counts_from_ms = stable_ms.max(able_since_ms);
         let expected = self.expected(snapshot, able_since_ms);
+        self.note_claims_of_the_dead(snapshot, members, lists);
         for (cell, lister) in (0..).zip(lister) {
             if lister.is_none() && expected.contains(cell) {
                 self.orphans.remove(&cell);
@@ -163,6 +169,33 @@ impl ListingCheck {
         expected
     }
 
+    /// What a dead one claimed is no orphan, until its death is found out, for whoever of those
+    /// that are to list it heard that claim: not only where that one itself was seen to list it
+    /// last. Somebody else may have been that, of whom nobody in reach knows.
+    fn note_claims_of_the_dead(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        members: &Membership,
+        lists: impl Fn(&PeerSnapshot) -> bool,
+    ) {
+        let n = snapshot.covered.capacity();
+        for m in snapshot.able().filter(|m| lists(m)) {
+            for ((_, author), (claim, (life, _))) in self.heard.range((m.id, 0)..=(m.id, u16::MAX))
+            {
+                let silence = members.silence(*author);
+                let is_its_last = silence.is_some_and(|s| s.incarnation == *life);
+                let unknown = is_its_last && members.detected_ms(*author).is_none();
+                if !unknown || claim.alone || claim.loop_hash != snapshot.loop_hash {
+                    continue;
+                }
+                let planned = claim.plan.iter().flat_map(|l| cells_of(l.run, n));
+                for cell in planned {
+                    self.claimed_by_dead.insert(cell, *author);
+                }
+            }
+        }
+    }
+
     fn settle(
         &mut self,
         snapshot: &Snapshot<'_>,
@@ -183,6 +216,7 @@ impl ListingCheck {
                 snapshot.takeover_ms(from_ms),
             );
         }
+        self.claimed_by_dead.remove(&cell);
         if let Some(by) = lister {
             self.last_lister.insert(cell, by);
         }
@@ -211,8 +245,10 @@ impl ListingCheck {
         let o = self.orphans.entry(cell).or_insert(Orphan {
             since_ms: snapshot.now_ms,
             owner,
+            claimant: None,
             told: false,
         });
+        o.claimant = o.claimant.or(self.claimed_by_dead.get(&cell).copied());
         let Some(from_ms) = counted_from(o, members) else {
             return;
         };
@@ -312,12 +348,11 @@ impl ListingCheck {
 /// From when an orphan counts: from the detection of its owner's death where it has
 /// one; `None` while nobody knows, which the check of detection bounds.
 fn counted_from(o: &Orphan, members: &Membership) -> Option<u64> {
-    match o.owner {
-        Some(owner) if members.silence(owner).is_some() => {
-            members.detected_ms(owner).map(|d| d.max(o.since_ms))
-        }
-        _ => Some(o.since_ms),
-    }
+    let owners = [o.owner, o.claimant].into_iter().flatten();
+    let mut dead = owners.filter(|id| members.silence(*id).is_some());
+    dead.try_fold(o.since_ms, |from_ms, id| {
+        members.detected_ms(id).map(|d| d.max(from_ms))
+    })
 }
 
 /// Whether a claim plans a cell that is still to be flown.
@@ -513,6 +548,54 @@ mod tests {
         assert_eq!(s.check.orphans(), 0);
     }
 
+    /// A claim of cells 2 and 3.
+    fn claim_of_two() -> Arc<Claim> {
+        let run = ListedRun {
+            run: CellRun { first: 2, count: 2 },
+            backward: false,
+            stamp: Stamp::default(),
+        };
+        Arc::new(Claim {
+            loop_hash: 9,
+            plan: vec![run],
+            ..Claim::default()
+        })
+    }
+
+    #[test]
+    fn what_a_dead_one_claimed_counts_from_its_detection_whoever_was_seen_to_list_it_last() {
+        for heard in [true, false] {
+            let mut s = Story::new(0);
+            for id in [1, 2, 3] {
+                s.members.on_life(0, id, 1);
+            }
+            // 3 is out of reach and believes all others down; it lists all while nobody else does.
+            s.alone = Some(3);
+            s.members.on_silent(500, 2, true, &BOUNDS);
+            s.check.on_death(2);
+            s.snapshot(1000, &[(3, &[0, 1, 2, 3])]);
+            // 1 comes back, and was told by others of 2 and of what that claims.
+            if heard {
+                s.check.on_heard((1, 2), (1, 1), &claim_of_two());
+            }
+            for t in 2..30 {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (3, &[0, 1, 2, 3])]);
+            }
+            assert_eq!(s.found.counts.is_empty(), heard, "{:?}", s.found.violations);
+            let down = (1, Status::Down);
+            s.members
+                .on_belief(30_500, (1, 2), down, (&BOUNDS, &Handicaps::default()), None);
+            for t in 31..42 {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (3, &[0, 1, 2, 3])]);
+            }
+            assert_eq!(s.found.counts.is_empty(), heard, "{:?}", s.found.violations);
+            for t in 42..46 {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (3, &[0, 1, 2, 3])]);
+            }
+            assert!(s.found.counts.contains_key("L2"), "its time is over");
+        }
+    }
+
     #[test]
     fn a_cell_yielded_to_one_who_is_dead_counts_from_the_detection_of_that_death() {
         let mut s = Story::new(0);
@@ -520,20 +603,10 @@ mod tests {
             s.members.on_life(0, id, 1);
         }
         s.snapshot(0, &[(1, &[0, 1, 2, 3])]);
-        let run = ListedRun {
-            run: CellRun { first: 2, count: 2 },
-            backward: false,
-            stamp: Stamp::default(),
-        };
-        let claim = Claim {
-            loop_hash: 9,
-            plan: vec![run],
-            ..Claim::default()
-        };
         s.members.on_silent(500, 2, true, &BOUNDS);
         s.check.on_death(2);
         // The claim reaches the other after its author's death.
-        s.check.on_heard((1, 2), (1, 1), &Arc::new(claim));
+        s.check.on_heard((1, 2), (1, 1), &claim_of_two());
         s.snapshot(1000, &[(1, &[0, 1, 2, 3])]);
         for t in 2..20 {
             s.snapshot(t * 1000, &[(1, &[0, 1])]);

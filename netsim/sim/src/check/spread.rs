@@ -310,8 +310,8 @@ impl SpreadCheck {
         }
     }
 
-    /// L3: an open cell that two plan is given up by one of them: the claims reach both, and
-    /// the one with the lower stamp yields within 2 T.
+    /// L3: an open cell that two plan is given up by one of them: the claims reach both, as
+    /// all records do, and the one with the lower stamp yields within 2 T.
     fn look_for_doubles(
         &mut self,
         snapshot: &Snapshot<'_>,
@@ -319,7 +319,7 @@ impl SpreadCheck {
         since_ms: u64,
         found: &mut Findings,
     ) {
-        let bound_ms = snapshot.bounds.spread_ms() + snapshot.bounds.yield_ms();
+        let bound_ms = record_ms(&snapshot.bounds, peers.len()) + snapshot.bounds.yield_ms();
         let on_the_loop = peers.iter();
         let on_the_loop = on_the_loop.filter(|m| m.view.loop_hash == snapshot.loop_hash);
         let n = snapshot.covered.capacity();

@@ -197,13 +197,23 @@ impl Survey {
     }
 
     /// Whether the loop serves a cell: of an area one that is to be seen, of places and lines a
-    /// piece that has a station; of straight passes the judge has squares of its own.
+    /// piece that has a station. Of straight passes the judge has squares of its own: one is left
+    /// out whose middle lies in pieces of passes that have no station, and in no other.
     fn is_planned(&self, geometry: &MissionGeometry, id: CellId) -> bool {
         let coverage_loop = &geometry.coverage_loop;
-        let cell = coverage_loop.index_of(id);
-        let cell = cell.and_then(|c| coverage_loop.cells().get(usize::from(c)));
-        let by_name = geometry.mission.task.is_area() || self.pieces.is_some();
-        !by_name || cell.is_some_and(|c| c.needed)
+        if geometry.mission.task.is_area() || self.pieces.is_some() {
+            let cell = coverage_loop.index_of(id);
+            let cell = cell.and_then(|c| coverage_loop.cells().get(usize::from(c)));
+            return cell.is_some_and(|c| c.needed);
+        }
+        let square = self.square(i32::from(id.col), i32::from(id.row));
+        let middle = square.min + (square.max - square.min) / 2.0;
+        let holds = |piece: CellId| {
+            let corners = coverage_loop.patches().corners(piece);
+            corners.is_some_and(|corners| in_ring(middle, &corners))
+        };
+        let is_left_out = coverage_loop.uncoverable().iter().any(|(p, _)| holds(*p));
+        !is_left_out || coverage_loop.cells().iter().any(|c| holds(c.id))
     }
 
     /// Counts the missions that the operator began anew.

@@ -82,10 +82,12 @@ pub struct Info {
     pub able: bool,
     /// Whether it is a ground station.
     pub ground_station: bool,
-    /// Mission revision it follows; of whoever told of it, until it is heard itself.
+    /// Mission revision it follows; of whoever told of it, until it said so itself.
     pub revision: u32,
     /// The loop it derived, likewise.
     pub loop_hash: u64,
+    /// Whether it said so itself: by its beacon, or by a claim, which comes from farther away.
+    pub is_own_word: bool,
     /// When its own beacon was last heard, without a relay.
     pub heard: Option<Time>,
     /// Where it was by then.
@@ -94,10 +96,10 @@ pub struct Info {
 
 impl Info {
     /// A neighbour tells of it. Members work on one loop: who is said to be able by a peer is
-    /// on that peer's loop, until its own beacon says otherwise.
+    /// on that peer's loop, until it says otherwise itself.
     fn hear_of(&mut self, able: bool, said: Option<&Beacon>) {
         self.able = able;
-        if let Some(said) = said.filter(|_| able && self.heard.is_none()) {
+        if let Some(said) = said.filter(|_| able && !self.is_own_word) {
             self.revision = said.revision;
             self.loop_hash = said.loop_hash;
         }
@@ -297,6 +299,26 @@ impl Membership {
             }
         }
         changes
+    }
+
+    /// A claim of this life that is new here names the revision and the loop of its author:
+    /// beacons are heard one hop away only, and who is farther is known to have left a loop by
+    /// nothing else. Of whom nothing is known yet it says nothing: who claims need not be able.
+    pub fn on_claim(
+        &mut self,
+        now: Time,
+        (author, incarnation): (u16, Incarnation),
+        (revision, loop_hash): (u32, u64),
+    ) {
+        self.noting(now, author, |m| {
+            let known = m.known.get_mut(&author);
+            let known = known.filter(|k| k.freshest.incarnation == incarnation);
+            if let Some(known) = known.filter(|k| k.info.loop_hash != 0) {
+                known.info.revision = revision;
+                known.info.loop_hash = loop_hash;
+                known.info.is_own_word = true;
+            }
+        });
     }
 
     /// What a neighbour says with its heartbeat of those of others. Returns what changed.
@@ -867,6 +889,7 @@ fn info_of(beacon: &Beacon, now: Time) -> Info {
         ground_station: beacon.ground_station,
         revision: beacon.revision,
         loop_hash: beacon.loop_hash,
+        is_own_word: true,
         heard: Some(now),
         place: Some(OffLoop {
             east_mm: beacon.east_mm,

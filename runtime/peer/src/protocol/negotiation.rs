@@ -5,14 +5,14 @@
 //! |---|---|---|
 //! | a member is lost and cells are orphaned | at once | a repair |
 //! | orphans | 2 T (5 T after a decision) | a repair |
-//! | an open round with a member that is gone | at once | the next round |
+//! | an open round with a member that is gone, or left for another loop | at once | the next round |
 //! | an open round without all bids | W, doubling to 4 W0 | the next round |
 //! | a complete round without its division | 2 W | the next round |
 //! | nothing divided yet | 1.5 T of listening, with a roster at once | a first section is taken |
 //! | only first sections, among few | 2 T | a repair |
 //! | orphans, and no round helped | 2 T + W0 + rank T/2 | the nearest are taken |
 //! | orphans, among many | 2 T each; 2 T for each who would be there sooner (W0 at most), and no less than the first of them would be there sooner | the nearest are taken |
-//! | orphans, among many, that nobody took who is idle | 2 T + W0; 2 T for each at work who would be there sooner (W0/2 at most) | a share of the nearest is taken |
+//! | orphans, among many, that nobody took who is idle | 2 T + W0; 2 T for each at work who would be there sooner (W0/2 at most) | a share is taken, of as many runs as it takes, the nearest first |
 //! | less than 2 T to fly, among many | twice a T | the far part of a slower one's plan is taken |
 //! | idle, and a gain was computed from what is held | 10 T steady, 20 T calm | a rebalancing |
 //! | idle, an owner makes no progress | its bound | the far half is taken |
@@ -90,6 +90,8 @@ pub struct Context<'a> {
     pub members: &'a [Member],
     /// How many more are taken for live because they were to be launched, and not heard of.
     pub unheard: usize,
+    /// Who of the live said that it works on another loop, and since when that is known.
+    pub elsewhere: &'a BTreeMap<u16, Time>,
     /// Hop diameter of the component.
     pub diameter: u32,
     /// Since when this peer is able without a break.
@@ -455,11 +457,11 @@ impl Negotiation {
     fn run_rounds(&mut self, ctx: &Context<'_>, orphans: &CellSet) {
         let orphaned_ms = self.orphan_since.map(|t| ctx.now.since_ms(t));
         if let Some(open) = self.rounds.open() {
-            let gone = open
-                .round
-                .members
-                .iter()
-                .any(|m| m.id != self.me && (ctx.live.get(&m.id) != Some(&m.incarnation)));
+            // Who left for another loop since this round was opened answers none on this one.
+            let left = |id| ctx.elsewhere.get(&id).is_some_and(|t| *t > self.opened_at);
+            let is_gone = |m: &Member| ctx.live.get(&m.id) != Some(&m.incarnation) || left(m.id);
+            let others = open.round.members.iter().filter(|m| m.id != self.me);
+            let gone = others.clone().any(is_gone);
             let waited = ctx.now.since_ms(self.opened_at);
             let repair = open.round.repair || !orphans.is_empty();
             if gone {

@@ -241,6 +241,18 @@ impl Pace<'_> {
         worth_it(done_ms).then_some((taken, done_ms))
     }
 
+    /// This peer once it has flown these cells as well, which it begins so soon.
+    fn after(&self, me: &Hand, begins_ms: u64, cells: &[(u16, Direction)]) -> Hand {
+        let end = cells.last().map(|(cell, _)| usize::from(*cell));
+        let end = end.map(|cell| self.coverage_loop.boundary(cell).position());
+        let flown_ms: u64 = cells.iter().map(|(cell, _)| self.cell_ms(*cell)).sum();
+        Hand {
+            id: me.id,
+            at: end.unwrap_or(me.at),
+            free_ms: begins_ms + flown_ms,
+        }
+    }
+
     /// How long a cell is flown, milliseconds.
     fn cell_ms(&self, cell: u16) -> u64 {
         let cells = self.coverage_loop.cells();
@@ -325,6 +337,37 @@ pub fn nearest_orphans(
     let (way_ms, _, direction, flown) = ways.min_by_key(|(ms, first, d, _)| (*ms, *first, *d))?;
     let taken = flown.into_iter().take(usize::from(most.max(1)));
     Some((way_ms, taken.map(|cell| (cell, direction)).collect()))
+}
+
+/// A run that is taken, in the order in which it is flown, and when that begins, milliseconds from
+/// now.
+pub type Taken = (u64, Vec<(u16, Direction)>);
+
+/// Of some orphaned cells as many runs as make a share, at most `share` cells: each the nearest
+/// from where the one before ends, until it is not the turn of this peer, as it will be then, to
+/// take one that begins with this cell.
+#[must_use]
+pub fn share_of_orphans(
+    mut orphans: CellSet,
+    hand: &Hand,
+    share: u16,
+    pace: Pace<'_>,
+    is_my_turn: impl Fn(&Hand, u16) -> bool,
+) -> Vec<Taken> {
+    let (mut hand, mut left, mut taken) = (*hand, share, Vec::new());
+    while left > 0
+        && let Some((begins_ms, cells)) = nearest_orphans(&orphans.runs(), &hand, left, pace)
+        && let Some((first, _)) = cells.first()
+        && is_my_turn(&hand, *first)
+    {
+        for (cell, _) in &cells {
+            orphans.remove(*cell);
+        }
+        left = left.saturating_sub(u16::try_from(cells.len()).unwrap_or(u16::MAX));
+        hand = pace.after(&hand, begins_ms, &cells);
+        taken.push((begins_ms, cells));
+    }
+    taken
 }
 
 #[cfg(test)]
@@ -538,6 +581,34 @@ mod tests {
             let (_, cells) = nearest_orphans(&runs, &me, 9, pace).unwrap();
             assert_eq!(cells, [22, 23, 0, 1].map(|c| (c, Direction::Forward)));
             assert_eq!(nearest_orphans(&[], &me, 9, pace), None);
+        });
+    }
+
+    #[test]
+    fn as_many_runs_are_taken_at_once_as_make_a_share() {
+        with_loop(|pace| {
+            let orphans = CellSet::of(24, [4, 5, 8, 12, 13, 14, 20]);
+            let me = hand(pace, 1, 8);
+            let share = |most, is_my_turn: &dyn Fn(&Hand, u16) -> bool| {
+                share_of_orphans(orphans.clone(), &me, most, pace, is_my_turn)
+            };
+            let cells = |taken: &[Taken]| -> Vec<u16> {
+                let all = taken.iter().flat_map(|(_, run)| run);
+                all.map(|(cell, _)| *cell).collect()
+            };
+            let all = share(24, &|_, _| true);
+            assert_eq!(all.len(), 4);
+            let mut once = cells(&all);
+            once.sort_unstable();
+            assert_eq!(once, [4, 5, 8, 12, 13, 14, 20]);
+            assert!(all.is_sorted_by_key(|(begins_ms, _)| *begins_ms));
+            // One that begins later is nobody's sooner than it is.
+            assert!(all[1].0 >= all[0].0 + pace.cell_ms(8));
+            assert_eq!(cells(&share(3, &|_, _| true)), cells(&all)[..3]);
+            // It ends where it is another's turn.
+            let second = all[1].1[0].0;
+            assert_eq!(cells(&share(24, &|_, first| first != second)), [8]);
+            assert!(share(0, &|_, _| true).is_empty());
         });
     }
 }

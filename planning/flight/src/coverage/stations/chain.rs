@@ -245,8 +245,9 @@ impl<'a> Chain<'a> {
             .map_or(Leg::Blocked, Leg::Clear)
     }
 
-    /// Leaves out one end of the leg that has the fewest ways left: the one that was in
-    /// the way more often. What was left out because of it comes back, once.
+    /// Leaves out one end of a leg that has no way left, the one that was in the way more often;
+    /// or the station at which no way in meets a way out. What was left out because of it comes
+    /// back, once.
     fn give_up(&mut self) {
         let n = self.stands.len();
         let open = |i: &usize| {
@@ -254,14 +255,19 @@ impl<'a> Chain<'a> {
             ways.filter(|l| l.cost_m().is_finite()).count()
         };
         let i = (0..n).min_by_key(open).unwrap_or(0);
-        let (a, b) = (self.stands[i].0, self.stands[self.next(i)].0);
-        for end in [a, b] {
-            *self.blame.entry(end).or_default() += 1;
-        }
-        let (out, other) = if self.blame[&a] > self.blame[&b] {
-            (i, b)
+        let parted = if open(&i) > 0 { self.parted() } else { None };
+        let (out, other) = if let Some(parted) = parted {
+            (parted, self.stands[self.next(parted)].0)
         } else {
-            (self.next(i), a)
+            let (a, b) = (self.stands[i].0, self.stands[self.next(i)].0);
+            for end in [a, b] {
+                *self.blame.entry(end).or_default() += 1;
+            }
+            if self.blame[&a] > self.blame[&b] {
+                (i, b)
+            } else {
+                (self.next(i), a)
+            }
         };
         let (station, stands) = self.leave_out(out);
         let back: Vec<Left>;
@@ -278,6 +284,20 @@ impl<'a> Chain<'a> {
             stands,
             other,
         });
+    }
+
+    /// Where every leg has ways left, the station at which a chain from the first one ends: none
+    /// of the poses that are reached there leads on.
+    fn parted(&self) -> Option<usize> {
+        let mut reached = vec![true; self.stands[0].1.len()];
+        (0..self.stands.len()).find(|&i| {
+            let onward = (0..self.stands[self.next(i)].1.len()).map(|b| {
+                let mut from = reached.iter().enumerate().filter(|(_, is)| **is);
+                from.any(|(a, _)| self.leg(i, a, b).cost_m().is_finite())
+            });
+            reached = onward.collect();
+            !reached.contains(&true)
+        })
     }
 
     fn leave_out(&mut self, i: usize) -> (usize, Vec<Pose>) {

@@ -2,6 +2,7 @@
 
 use super::targets::{LineTarget, PointTarget, Targets};
 use super::*;
+use crate::coverage::passes::{self, PassesProblem};
 use crate::coverage::ring::patch::frame_holds;
 use proptest::prelude::*;
 use skein_geometry::math::wrap_pi;
@@ -271,4 +272,39 @@ proptest! {
             prop_assert!(flown.zones.distance_m(middle) >= flown.clearance_m);
         }
     }
+}
+
+/// Zones so near to each other that what keeps clear of both is a notch: few pieces lie in it.
+/// All legs have ways left there, and at one place no way in meets a way out.
+#[test]
+fn what_lies_between_two_zones_is_left_out_and_nothing_else() {
+    let around = |x: f64, y: f64| {
+        let at = |i: u32| {
+            let (s, c) = skein_geometry::math::sin_cos(f64::from(i) * core::f64::consts::PI / 4.0);
+            Point::new(x + 20.6 * c, y + 20.6 * s)
+        };
+        Polygon::new((0..8).map(at).collect()).unwrap()
+    };
+    let flown = LoopProblem {
+        area: rectangle(0.0, 60.0, 860.0, 720.0),
+        lane_spacing_m: 72.0,
+        turn_radius_m: 36.0,
+        clearance_m: 75.0,
+        footprint_across_m: 68.0,
+        footprint_along_m: 42.9,
+        launch: Point::new(430.0, -40.0),
+        ..flown(vec![around(300.0, 430.0), around(246.0, 281.8)])
+    };
+    let passes = PassesProblem {
+        zones: Arc::clone(&flown.zones),
+        clearance_m: flown.clearance_m,
+        look_ahead_m: 0.0,
+        ..PassesProblem::new(flown.area.clone(), 72.0, 36.0, flown.launch)
+    };
+    let passes = passes::plan(&passes).unwrap().passes;
+    let problem = StationsProblem::of_passes(&flown, &passes);
+    let l = build(&problem).unwrap();
+    judge(&problem, &l);
+    let (served, left_out) = (l.len(), l.uncoverable().len());
+    assert!(served > 110 && left_out <= 5, "{served} {left_out}");
 }

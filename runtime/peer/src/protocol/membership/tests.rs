@@ -193,6 +193,36 @@ fn entry(id: u16, heartbeat: u32, age_ds: u16, suspected_ds: Option<u16>) -> Gos
 }
 
 #[test]
+fn on_which_loop_somebody_works_its_own_word_tells_before_that_of_others() {
+    let on = |loop_hash, heartbeat, gossip| Beacon {
+        loop_hash,
+        ..beacon(heartbeat, gossip)
+    };
+    let mut m = Membership::new(1, 1000);
+    let tells_of_four = |heartbeat| on(7, heartbeat, vec![entry(4, 20 + heartbeat, 1, None)]);
+    let loop_of = |m: &Membership, id| m.info(id).map(|i| i.loop_hash);
+    // Who never spoke itself is on the loop of whoever tells that it is able.
+    m.on_claim(Time(0), (4, 1), (3, 8));
+    m.on_beacon(Time(0), 9, 1, &tells_of_four(1));
+    assert_eq!(loop_of(&m, 4), Some(7));
+    // Its claim comes over several hops; what others tell says nothing any more.
+    let before = m.changes();
+    m.on_claim(Time(100), (4, 1), (3, 8));
+    assert!(m.changes() > before);
+    m.on_beacon(Time(1000), 9, 1, &tells_of_four(2));
+    assert_eq!(loop_of(&m, 4), Some(8));
+    // Of two words the one that was heard last counts.
+    m.on_beacon(Time(1500), 4, 1, &on(7, 30, Vec::new()));
+    assert_eq!(loop_of(&m, 4), Some(7));
+    m.on_claim(Time(1600), (4, 1), (3, 8));
+    assert_eq!(loop_of(&m, 4), Some(8));
+    // Claims of another life than the one that is known are none of its.
+    m.on_claim(Time(1700), (4, 2), (3, 9));
+    m.on_claim(Time(1700), (5, 1), (3, 9));
+    assert_eq!((loop_of(&m, 4), loop_of(&m, 5)), (Some(8), None));
+}
+
+#[test]
 fn who_began_a_life_anew_is_reminded_through_those_who_never_met_the_first() {
     let mut m = Membership::new(6, 1000);
     // The new beginning is heard directly, the old end of the same life from afar.

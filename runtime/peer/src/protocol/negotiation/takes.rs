@@ -223,11 +223,23 @@ impl Negotiation {
         cells: &[(u16, Direction)],
         begins_ms: u64,
     ) -> Option<Vec<PlannedCell>> {
-        let away = (begins_ms / NEARNESS_STEP_MS).min(NEARNESS_MAX);
-        let nearness = u16::try_from(NEARNESS_MAX - away).unwrap_or(0);
-        let mut taken = self.begin_take(cells)?;
-        for p in &mut taken {
-            p.stamp.take = p.stamp.take.saturating_add(nearness);
+        self.begin_each(&[(begins_ms, cells.to_vec())])
+    }
+
+    /// The same of several runs, each begun so soon.
+    pub fn begin_each(
+        &mut self,
+        runs: &[(u64, Vec<(u16, Direction)>)],
+    ) -> Option<Vec<PlannedCell>> {
+        let cells: Vec<_> = runs.iter().flat_map(|(_, cells)| cells).copied().collect();
+        let mut taken = self.begin_take(&cells)?;
+        for (begins_ms, cells) in runs {
+            let away = (begins_ms / NEARNESS_STEP_MS).min(NEARNESS_MAX);
+            let nearness = u16::try_from(NEARNESS_MAX - away).unwrap_or(0);
+            let of_this = |p: &&mut PlannedCell| cells.iter().any(|(cell, _)| *cell == p.cell);
+            for p in taken.iter_mut().filter(of_this) {
+                p.stamp.take = p.stamp.take.saturating_add(nearness);
+            }
         }
         Some(taken)
     }
