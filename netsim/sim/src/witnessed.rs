@@ -151,11 +151,8 @@ impl Witnessed {
         for asked in &known.tasks {
             self.tracks.on_asked(asked);
         }
-        let waits = Waiting::Known(Box::new(known));
-        if let Waiting::Known(known) = &waits {
-            self.waiting
-                .insert((known.at_ms, peer, true), waits.clone());
-        }
+        let key = (known.at_ms, peer, true);
+        self.waiting.insert(key, Waiting::Known(Box::new(known)));
     }
 
     /// A peer tells people that a sector became too dense, or has eased.
