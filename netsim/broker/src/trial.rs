@@ -479,6 +479,7 @@ impl<'a> Trial<'a> {
     fn asked(&mut self, tasks: &[AskedTask]) {
         for asked in tasks {
             self.account.asked(self.now_ms, asked);
+            self.witnessed.asked(asked);
             if let Some(look) = AskedLook::of(&self.spec, &self.mission, asked) {
                 self.world.ask(look);
             }

@@ -107,9 +107,11 @@ impl Witnessed {
         self.counts.on_mission(mission);
         self.streets.on_mission(mission);
         self.crowds.on_mission(mission);
-        for asked in mission.brought(false) {
-            self.tracks.on_asked(&asked);
-        }
+    }
+
+    /// The ground station holds a task, or the mission brings it.
+    pub fn asked(&mut self, asked: &AskedTask) {
+        self.tracks.on_asked(asked);
     }
 
     /// A UAV is given a percept: what it sees then is kept.
@@ -148,9 +150,6 @@ impl Witnessed {
 
     /// A peer says what it knows.
     pub fn knows(&mut self, peer: u16, known: Known) {
-        for asked in &known.tasks {
-            self.tracks.on_asked(asked);
-        }
         let key = (known.at_ms, peer, true);
         self.waiting.insert(key, Waiting::Known(Box::new(known)));
     }
@@ -193,8 +192,8 @@ impl Witnessed {
 
     fn judge(&mut self, (at_ms, uav): (u64, u16), m: &Moment, said: &Looked, world: &World) {
         let flies = |l: &&Looked| {
-            let is_here = l.seen_ms + SILENT_MS >= at_ms;
-            is_here && l.life.is_some() && l.revision >= self.revision && !l.is_finished
+            let is_newest = l.revision >= self.revision;
+            is_of_late(l, at_ms) && l.life.is_some() && is_newest && !l.is_finished
         };
         let able = || self.latest.iter().filter(|(_, l)| flies(l));
         let ids: BTreeSet<u16> = able().map(|(id, _)| *id).collect();
@@ -254,7 +253,7 @@ impl Witnessed {
     /// Who said something of late.
     fn says(&self, uav: u16, now_ms: u64) -> Option<&Looked> {
         let said = self.latest.get(&uav);
-        said.filter(|l| l.seen_ms + SILENT_MS >= now_ms)
+        said.filter(|l| is_of_late(l, now_ms))
     }
 
     /// Who says that it follows somebody is looked at beside where vehicles are.
@@ -368,6 +367,10 @@ impl Witnessed {
     pub fn tracked(&self) -> impl Iterator<Item = ((u16, u32), &Tracked)> {
         self.tracks.tracked()
     }
+}
+
+fn is_of_late(said: &Looked, now_ms: u64) -> bool {
+    said.seen_ms + SILENT_MS >= now_ms
 }
 
 /// What the judge of a world is told of a task.

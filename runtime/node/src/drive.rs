@@ -326,9 +326,7 @@ where
             Happened::World(News::Tick(tick)) => self.tick(tick).await,
             Happened::Sensed(percept) => {
                 self.step(Input::Percept(*percept)).await;
-                if let Some(looked) = self.peer.looked() {
-                    self.around.world.witness(&looked).await;
-                }
+                self.bear_witness(P::looked).await;
             }
             Happened::Stored(Stored { token, ok }) => self.step(Input::Stored { token, ok }).await,
             Happened::Computed(token, result) => self.step(Input::Computed { token, result }).await,
@@ -364,8 +362,15 @@ where
     }
 
     async fn tell_known(&mut self, now: Time) {
-        if let Some(known) = self.peer.known(now.0) {
-            self.around.world.witness(&known).await;
+        self.bear_witness(|peer| peer.known(now.0)).await;
+    }
+
+    /// Tells the world's judge something of the peer; nothing is made up where there is none.
+    async fn bear_witness(&mut self, of: impl FnOnce(&P) -> Option<Witness>) {
+        if self.around.world.judges()
+            && let Some(witness) = of(&self.peer)
+        {
+            self.around.world.witness(&witness).await;
         }
     }
 

@@ -7,6 +7,7 @@
 
 use crate::vehicle::Vehicle;
 use crate::world::{News, Tick, World};
+use serde::Serialize;
 use skein_behaviors::{Percept, Setpoint};
 use skein_link::RadioCounters;
 use skein_link::frame::{Decoder, FrameError, ToPeer, ToWorld, encode};
@@ -152,6 +153,14 @@ impl Shared {
             Err(cause) => tracing::error!(%cause, "a frame for the world was not sent"),
         }
     }
+
+    /// Tells something of the peer's own crate, in a frame of its own.
+    async fn say<T: Serialize>(&self, what: &T, frame: fn(Vec<u8>) -> ToWorld) {
+        match cbor4ii::serde::to_vec(Vec::new(), what) {
+            Ok(bytes) => self.tell(&frame(bytes)).await,
+            Err(cause) => tracing::error!(%cause, "what the peer says was not sent"),
+        }
+    }
 }
 
 /// Connects, says hello and waits for the welcome.
@@ -246,17 +255,15 @@ impl World for SimulatedWorld {
     }
 
     async fn report(&mut self, report: &Report) {
-        match cbor4ii::serde::to_vec(Vec::new(), report) {
-            Ok(bytes) => self.shared.tell(&ToWorld::Report(bytes)).await,
-            Err(cause) => tracing::error!(%cause, "a report was not sent"),
-        }
+        self.shared.say(report, ToWorld::Report).await;
+    }
+
+    fn judges(&self) -> bool {
+        true
     }
 
     async fn witness(&mut self, witness: &Witness) {
-        match cbor4ii::serde::to_vec(Vec::new(), witness) {
-            Ok(bytes) => self.shared.tell(&ToWorld::Witness(bytes)).await,
-            Err(cause) => tracing::error!(%cause, "what is seen was not sent"),
-        }
+        self.shared.say(witness, ToWorld::Witness).await;
     }
 
     async fn count(&mut self, counters: RadioCounters) {

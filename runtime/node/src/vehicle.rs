@@ -4,7 +4,8 @@
 //! turns telemetry into percepts, five a second in the scenarios, and flies setpoints, an
 //! airspeed, a height and up to eight timed turn rates. It owes the failsafe: without a
 //! setpoint for a second the airframe loiters by itself, on the side that the last one
-//! named; where that one says what others were promised, it flies that instead. A ground station has no vehicle.
+//! named; where that one says what others were promised, it flies that instead. A ground station
+//! has no vehicle.
 
 use skein_behaviors::{Percept, Setpoint};
 use std::future::Future;

@@ -36,6 +36,9 @@ pub trait World: Send {
     /// What the peer reports, for displays and judges.
     fn report(&mut self, report: &Report) -> impl Future<Output = ()> + Send;
 
+    /// Whether anybody wants to be told what the peer sees and knows.
+    fn judges(&self) -> bool;
+
     /// What the peer says of what it sees and knows, for judges.
     fn witness(&mut self, witness: &Witness) -> impl Future<Output = ()> + Send;
 
@@ -59,6 +62,10 @@ impl<W: World> World for Option<W> {
         if let Some(world) = self {
             world.report(report).await;
         }
+    }
+
+    fn judges(&self) -> bool {
+        self.as_ref().is_some_and(World::judges)
     }
 
     async fn witness(&mut self, witness: &Witness) {

@@ -32,13 +32,16 @@ pub const LOOKS: [&str; 4] = ["bicycle", "car", "lorry", "bus"];
 /// that it could tell.
 pub const COLOURED: u8 = 8;
 
+/// The largest number of a colour.
+pub const COLOUR_MAX: u8 = u8::MAX / COLOURED;
+
 /// The colours of vehicles, from colour 1 on.
 pub const COLOURS: [&str; 7] = ["white", "black", "grey", "red", "blue", "green", "yellow"];
 
 /// What a detector tells of a vehicle of this kind and colour.
 #[must_use]
 pub fn coloured(kind: u8, colour: u8) -> u8 {
-    kind % COLOURED + COLOURED * (colour % (u8::MAX / COLOURED))
+    kind % COLOURED + COLOURED * colour.min(COLOUR_MAX)
 }
 
 /// The kind of what looks so.
@@ -176,9 +179,9 @@ impl Criterion {
         if self.looks.is_some_and(|kind| kind >= COLOURED) {
             return Err(("kind", format!("expected less than {COLOURED}")));
         }
-        let colours = 1..=u8::MAX / COLOURED;
+        let colours = 1..=COLOUR_MAX;
         if self.colour.is_some_and(|colour| !colours.contains(&colour)) {
-            return Err(("colour", format!("expected 1 to {}", u8::MAX / COLOURED)));
+            return Err(("colour", format!("expected 1 to {COLOUR_MAX}")));
         }
         if !(1..=AT_MOST_MAX).contains(&self.at_most) {
             let text = format!("expected 1 to {AT_MOST_MAX}");

@@ -134,14 +134,13 @@ impl Separation {
     }
 
     /// The same for a mission that goes before, with all that was promised and heard in it.
-    pub fn after(mut self, before: Self, executive: &Executive) -> Self {
+    pub fn after(self, before: Self, executive: &Executive) -> Self {
         let apart = self.apart(executive);
-        self.conflicts = before.conflicts.map(|known| known.under(apart));
         Self {
             me: self.me,
             rules: self.rules,
             airframe: self.airframe,
-            conflicts: self.conflicts,
+            conflicts: before.conflicts.map(|known| known.under(apart)),
             offered: None,
             is_news: true,
             search_from_ms: 0,

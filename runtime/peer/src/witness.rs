@@ -7,16 +7,13 @@ use crate::gathering::Sector;
 use crate::hint::Hint;
 use crate::input::AskedTask;
 use crate::mission::Mission;
-use crate::streets::Streets;
 use crate::tasking::Follows;
-use crate::usage::{StretchSum, Usages};
+use crate::usage::StretchSum;
 use crate::wire::count::Count;
 use crate::wire::trail::Trail;
 use crate::{Incarnation, Peer};
 use serde::{Deserialize, Serialize};
-use skein_flight::streets::Network;
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 /// Something that a peer says to who judges it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -157,25 +154,5 @@ impl Peer {
             known.hints = self.hints();
         }
         Some(known)
-    }
-}
-
-impl Usages {
-    /// It without the streets, to be carried to who has these too.
-    #[must_use]
-    pub fn seen(&self) -> StreetsSeen {
-        let stretches = self.stretches().map(|((i, s), sum)| (i, s, *sum));
-        StreetsSeen {
-            stretches: stretches.collect(),
-            turns: self.turns_by_number().collect(),
-        }
-    }
-
-    /// What was carried, of these streets; stretches that they do not have are left out.
-    #[must_use]
-    pub fn of(streets: Arc<Streets>, network: Arc<Network>, seen: &StreetsSeen) -> Self {
-        let mut new = Self::new(streets, network);
-        new.take(seen);
-        new
     }
 }

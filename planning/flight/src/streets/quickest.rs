@@ -43,13 +43,13 @@ impl Network {
     /// The place of a street that is nearest; none within [`REACH_M`].
     #[must_use]
     pub fn nearest(&self, to: Point) -> Option<Matched> {
-        let mut best: Option<Matched> = None;
-        for (m, _) in self.on_each_piece(to) {
-            if m.aside_m <= best.map_or(REACH_M, |b| b.aside_m) {
-                best = Some(m);
-            }
-        }
-        best
+        self.near(to).reduce(nearer)
+    }
+
+    /// The places of all pieces of streets within [`REACH_M`].
+    fn near(&self, to: Point) -> impl Iterator<Item = Matched> {
+        let all = self.on_each_piece(to).map(|(m, _)| m);
+        all.filter(|m| m.aside_m <= REACH_M)
     }
 
     /// Where a way begins and where it ends: where streets that hang together pass nearest to both
@@ -66,12 +66,10 @@ impl Network {
         };
         let nearest = |place: Point| {
             let mut by: BTreeMap<usize, Matched> = BTreeMap::new();
-            let near = self.on_each_piece(place).map(|(m, _)| m);
-            for m in near.filter(|m| m.aside_m <= REACH_M) {
-                let Some(part) = of(&m) else { continue };
-                let best = by.entry(part).or_insert(m);
-                if m.aside_m <= best.aside_m {
-                    *best = m;
+            for m in self.near(place) {
+                if let Some(part) = of(&m) {
+                    let best = by.entry(part).or_insert(m);
+                    *best = nearer(*best, m);
                 }
             }
             by
@@ -182,6 +180,11 @@ impl Network {
         line.dedup();
         line
     }
+}
+
+/// Of two places the nearer one, of two as near the later one.
+fn nearer(a: Matched, b: Matched) -> Matched {
+    if b.aside_m <= a.aside_m { b } else { a }
 }
 
 #[cfg(test)]

@@ -199,6 +199,10 @@ impl World for TestWorld {
         self.log.seen().reports.push(report.clone());
     }
 
+    fn judges(&self) -> bool {
+        true
+    }
+
     async fn witness(&mut self, witness: &Witness) {
         self.log.seen().witnesses.push(witness.clone());
     }

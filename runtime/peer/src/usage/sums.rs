@@ -213,22 +213,25 @@ impl Usages {
         all.filter_map(|(n, taken)| Some((*self.network.turns().get(usize::from(*n))?, *taken)))
     }
 
-    /// The same by the numbers of turns.
-    pub(crate) fn turns_by_number(&self) -> impl Iterator<Item = (u16, u32)> + '_ {
-        self.turns.iter().map(|(n, taken)| (*n, *taken))
+    /// It without the streets, to be carried to who has these too.
+    #[must_use]
+    pub fn seen(&self) -> StreetsSeen {
+        let stretches = self.stretches().map(|((i, s), sum)| (i, s, *sum));
+        StreetsSeen {
+            stretches: stretches.collect(),
+            turns: self.turns.iter().map(|(n, taken)| (*n, *taken)).collect(),
+        }
     }
 
-    /// Adds what was carried from somebody else.
-    pub(crate) fn take(&mut self, seen: &StreetsSeen) {
-        let all = self.network.edges().len();
-        for (interval, stretch, sum) in &seen.stretches {
-            if usize::from(*stretch) < all {
-                let known = self.stretches.entry((*interval, *stretch)).or_default();
-                known.add(sum);
-            }
-        }
-        for (turn, taken) in &seen.turns {
-            *self.turns.entry(*turn).or_default() += taken;
+    /// What was carried, of these streets; stretches that they do not have are left out.
+    #[must_use]
+    pub fn of(streets: Arc<Streets>, network: Arc<Network>, seen: &StreetsSeen) -> Self {
+        let all = network.edges().len();
+        let of_these = seen.stretches.iter().filter(|s| usize::from(s.1) < all);
+        Self {
+            stretches: of_these.map(|(i, s, sum)| ((*i, *s), *sum)).collect(),
+            turns: seen.turns.iter().copied().collect(),
+            ..Self::new(streets, network)
         }
     }
 
