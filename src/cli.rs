@@ -89,7 +89,8 @@ pub enum Verb {
     Mission(MissionArgs),
     /// Adds and removes no-fly zones in flight, at a ground station's console.
     Nfz(NfzArgs),
-    /// Asks for tasks in flight and cancels them, at a ground station's console.
+    /// Asks for tasks in flight, cancels them and says what was done on the ground, at a ground
+    /// station's console.
     Task(TaskArgs),
     /// The quickest way along the mission's streets, at a ground station's console.
     Hint(HintArgs),

@@ -1,4 +1,5 @@
-//! `skein task`: tasks other than coverage that are asked for and cancelled in flight.
+//! `skein task`: tasks other than coverage that are asked for, cancelled, and said to be done, in
+//! flight.
 
 use crate::console::{AtArgs, Refusal, look, say};
 use crate::exit;
@@ -14,7 +15,7 @@ use skein_peer::wire::tasks::{SENSORS, TaskKind, WORTH_MAX, sensor_of_name};
 use skein_peer::{Overview, TaskView, WATCHERS_MAX};
 use std::process::ExitCode;
 
-/// Asks for tasks in flight and cancels them.
+/// Asks for tasks in flight, cancels them, and says that they were done on the ground.
 ///
 /// The UAVs settle by auction who does which: who wins leaves its section between two cells,
 /// flies there, and comes back. A task is done when a UAV saw all of it. A relay
@@ -41,6 +42,12 @@ pub enum What {
     /// Cancels a task that is open.
     Cancel {
         /// Its name.
+        name: String,
+    },
+    /// Says that a task was done on the ground: services have reached what is followed, or
+    /// somebody looked there. Whoever flies for it goes on with its own.
+    Done {
+        /// Its name, whoever asked for it; `skein task list` tells all.
         name: String,
     },
     /// All tasks and what became of them.
@@ -163,8 +170,13 @@ fn radius_m(text: &str) -> Result<f64, String> {
 /// # Errors
 /// When there is no runtime or stdout cannot be written.
 pub fn run(args: &TaskArgs) -> anyhow::Result<ExitCode> {
-    if let What::Cancel { name } = &args.what {
-        return say(&args.at, &Command::Task(TaskEdit::Cancel(name.clone())));
+    let edit = match &args.what {
+        What::Cancel { name } => Some(TaskEdit::Cancel(name.clone())),
+        What::Done { name } => Some(TaskEdit::Done(name.clone())),
+        What::Add(_) | What::List { .. } => None,
+    };
+    if let Some(edit) = edit {
+        return say(&args.at, &Command::Task(edit));
     }
     let overview = match look::<Overview>(&args.at, None, &Command::Show)? {
         Ok((overview, _)) => overview,
@@ -187,7 +199,7 @@ pub fn run(args: &TaskArgs) -> anyhow::Result<ExitCode> {
             exit::print(json!({ "revision": overview.revision, "tasks": tasks }))?;
             Ok(ExitCode::from(exit::OK))
         }
-        What::List { .. } | What::Cancel { .. } => {
+        What::List { .. } | What::Cancel { .. } | What::Done { .. } => {
             exit::print(as_text(&overview.tasks, origin))?;
             Ok(ExitCode::from(exit::OK))
         }
@@ -392,6 +404,7 @@ mod tests {
             "task add relay 60,25 --within-s 60",
             "task add track 60,25 --watchers 0",
             "task cancel",
+            "task done",
         ] {
             assert!(added(wrong).is_err(), "{wrong}");
         }

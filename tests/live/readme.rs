@@ -301,7 +301,7 @@ fn a_trial_with_everything(r: &mut Readme) {
     well(r.exactly("skein nfz add --circle 60.1690,24.9400,30 --id fire"));
     assert!(told(r.instead(nfz, "skein nfz list")).contains("fire"));
     well(r.instead(nfz, "skein nfz remove fire"));
-    let task = "skein task add|cancel|list";
+    let task = "skein task add|cancel|done|list";
     well(r.exactly("skein task add point 60.1690,24.9400"));
     well(r.exactly("skein task add line 60.1690,24.9400 60.1701,24.9422 --needs infrared"));
     well(r.exactly("skein task add track 60.1690,24.9400 --for 60"));
@@ -309,6 +309,9 @@ fn a_trial_with_everything(r: &mut Readme) {
     well(r.instead("skein task add point 60.1690,24.9400", id));
     assert!(told(r.instead(task, "skein task list")).contains("later"));
     well(r.instead(task, "skein task cancel later"));
+    let id = "skein task add point 60.1700,24.9410 --id looked-at";
+    well(r.instead("skein task add point 60.1690,24.9400", id));
+    well(r.instead(task, "skein task done looked-at"));
 
     well(r.exactly("skein chaos kill 3"));
     let order = "skein mission hold|resume|rtb [--uav ID]";

@@ -145,6 +145,10 @@ impl Injector<'_> {
                 let edit = TaskEdit::Cancel(name.clone());
                 self.operate(&Command::Task(edit)).await
             }
+            Fault::DoneTask { name } => {
+                let edit = TaskEdit::Done(name.clone());
+                self.operate(&Command::Task(edit)).await
+            }
             Fault::Revise { .. } => {
                 Err("another mission is given by `skein mission revise`".to_owned())
             }

@@ -8,6 +8,7 @@ use skein_netsim::radio::{LinkTable, Overlay};
 use skein_netsim::spec::Spec;
 use skein_netsim::witnessed::AskedLook;
 use skein_netsim::world::{Fact, Judge, Site, Survey, World};
+use skein_peer::Call;
 use skein_peer::offload::MissionGeometry;
 use std::sync::Arc;
 
@@ -117,6 +118,11 @@ impl LiveWorld {
     /// Somebody asks for a look.
     pub fn ask(&mut self, look: AskedLook) {
         self.world.ask(look.task, look.pieces, look.carriers);
+    }
+
+    /// The ground station calls services on the ground; gives those calls that are served.
+    pub fn dispatch(&mut self, calls: &[Call]) -> Vec<Call> {
+        self.world.dispatch(calls)
     }
 
     /// A revision of the mission is judged by from now on.

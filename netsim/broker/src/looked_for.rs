@@ -7,6 +7,7 @@ use skein_peer::Mission;
 use skein_peer::criteria::Criterion;
 use skein_peer::wire::detection::{Detection, Stands};
 use skein_peer::wire::tasks::TaskId;
+use std::collections::BTreeMap;
 
 /// A detection is heard of by all, and what follows is settled, within so long, milliseconds.
 const SETTLED_MS: u64 = 30_000;
@@ -19,8 +20,8 @@ pub(crate) struct LookedFor {
     ends_when_found: bool,
     /// Whether the mission brings tasks, which go before its cells.
     brings: bool,
-    /// Until when what was told is followed, milliseconds.
-    until_ms: u64,
+    /// Until when what was told is followed, milliseconds, by the task.
+    until_ms: BTreeMap<TaskId, u64>,
 }
 
 impl LookedFor {
@@ -31,7 +32,7 @@ impl LookedFor {
             criteria: Vec::new(),
             ends_when_found: false,
             brings: false,
-            until_ms: 0,
+            until_ms: BTreeMap::new(),
         };
         new.given(mission);
         new
@@ -44,7 +45,7 @@ impl LookedFor {
         self.ends_when_found = mission.ends_when_found();
         self.brings = !mission.tasks.is_empty();
         if mission.cancelled {
-            self.until_ms = 0;
+            self.until_ms.clear();
         }
     }
 
@@ -63,7 +64,8 @@ impl LookedFor {
             && told.stands == Stands::Told
         {
             let settled_ms = at.0 + SETTLED_MS;
-            self.until_ms = self.until_ms.max(told.seen_ms + for_ms).max(settled_ms);
+            self.until_ms
+                .insert(id, settled_ms.max(told.seen_ms + for_ms));
         }
         found.violations.iter().map(ToString::to_string).collect()
     }
@@ -90,6 +92,13 @@ impl LookedFor {
 
     /// Whether somebody is to follow what was told.
     pub(crate) fn waits(&self, now_ms: u64) -> bool {
-        now_ms < self.until_ms
+        self.until_ms.values().any(|until| now_ms < *until)
+    }
+
+    /// Services on the ground have reached what a task is to follow, by the word of a ground
+    /// station: nobody does so from now on.
+    pub(crate) fn served(&mut self, said: (u64, u16), task: (TaskId, u32)) {
+        self.check.on_served(said, task);
+        self.until_ms.remove(&task.0);
     }
 }

@@ -22,11 +22,11 @@ use skein_peer::input::AskedTask;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::output::TaskNews;
 use skein_peer::witness::Witness;
-use skein_peer::{Mission, Report};
+use skein_peer::{Call, Mission, Report};
 use skein_recording::Sink;
 use skein_recording::run_dir::{self, Manifest};
 use skein_recording::writer::Writer;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -191,6 +191,8 @@ struct Trial<'a> {
     timed: bool,
     /// What the mission looks for.
     looked_for: LookedFor,
+    /// Tasks of which the operator is to say that services on the ground are there, by name.
+    served: BTreeSet<String>,
     /// What peers say of what they see.
     witnessed: Witnessed,
     /// The mission that is judged.
@@ -271,6 +273,7 @@ impl<'a> Trial<'a> {
             cancelled: false,
             timed: geometry.mission.ends_after_s().is_some(),
             looked_for: LookedFor::new(&geometry.mission),
+            served: BTreeSet::new(),
             witnessed: Witnessed::new(&spec, &geometry.mission),
             mission: Arc::clone(&geometry.mission),
             transmissions: (0, 0),
@@ -469,9 +472,21 @@ impl<'a> Trial<'a> {
             Witness::Known(known) => {
                 if known.is_ground {
                     self.asked(&known.tasks);
+                    self.call(id, &known.calls);
                 }
                 self.witnessed.knows(id, *known);
             }
+        }
+    }
+
+    /// The ground station calls services on the ground; its operator will say of those that are
+    /// served that they are.
+    fn call(&mut self, station: u16, calls: &[Call]) {
+        for call in self.world.dispatch(calls) {
+            let task = (call.task, call.revision);
+            self.looked_for.served((self.now_ms, station), task);
+            self.account.detected(self.looked_for.reports());
+            self.served.insert(call.name);
         }
     }
 
@@ -689,6 +704,14 @@ impl<'a> Trial<'a> {
 
     /// Carries out what is due by now, in the order of the times.
     async fn carry_out_due(&mut self) {
+        for name in std::mem::take(&mut self.served) {
+            // Where it is not heard the ground station will call again.
+            if let Err(why) = self.inject(&Fault::DoneTask { name }).await {
+                self.note(format!(
+                    "the ground station was not told that services are there: {why}"
+                ));
+            }
+        }
         while let Some((fault, needed)) = self.faults.take_due(self.now_ms) {
             if let Err(why) = self.inject(&fault).await {
                 let text = format!("a fault could not be carried out: {fault:?}: {why}");

@@ -41,13 +41,17 @@ fn what_drives_is_followed_until_services_are_there_and_what_else_drives_is_told
     assert_eq!(told.len(), 2);
     let lorry = of("lorry").next().unwrap();
     assert!(lorry.to_follow && lorry.vehicle == Some(0) && lorry.off_mm < 8_500);
+    // In sight until services have reached it, long before the longest time.
+    let (from_ms, served_ms) = (lorry.followed_ms.unwrap(), lorry.served_ms.unwrap());
+    assert!(served_ms < from_ms + 400_000, "{}", lorry.line());
     assert!(
-        (200_000..245_000).contains(&lorry.sight_ms),
+        (served_ms - from_ms).abs_diff(lorry.sight_ms) < 15_000,
         "{}",
         lorry.line()
     );
     let car = of("car").next().unwrap();
     assert!(!car.to_follow && car.followed_ms.is_none() && car.vehicle == Some(1));
+    assert_eq!(car.served_ms, None);
     // Then who followed it covers again: all is seen, and all are finished.
     assert_eq!(outcome.report.finished.len(), 3);
 }
@@ -66,13 +70,59 @@ fn a_search_ends_when_it_is_found_and_it_is_watched_by_one_uav_and_of_many() {
             "{}",
             bus.line()
         );
-        assert!(bus.sight_ms > 560_000, "{}", bus.line());
+        // Until a party on foot has come 600 m.
+        let served_ms = bus.served_ms.unwrap();
+        let walked_ms = served_ms - bus.told_ms;
+        assert!((380_000..430_000).contains(&walked_ms), "{}", bus.line());
+        assert!(bus.sight_ms + 30_000 > walked_ms, "{}", bus.line());
+        assert!(report.end_ms < served_ms + 20_000, "{}", bus.line());
         // Not everything was seen, and nobody flew on for that.
         let c = &report.coverage;
         assert!(c.covered_cells < c.coverable_cells);
         assert!(report.found_ms.unwrap() < bus.told_ms + 10_000);
         assert_eq!(report.finished.len(), usize::from(uavs));
     }
+}
+
+/// Where no services come one watches for as long as the mission says.
+#[test]
+fn without_services_what_was_found_is_watched_for_its_time() {
+    let mut spec = load_builtin("search", &Overrides::default()).unwrap().spec;
+    spec.services.clear();
+    let faults = spec.faults.clone();
+    let outcome = run(&Prepared::new(spec), 4, faults, Wanted::default());
+    passed(&outcome);
+    let bus = &outcome.report.detections[0];
+    assert!(
+        bus.sight_ms > 560_000 && bus.served_ms.is_none(),
+        "{}",
+        bus.line()
+    );
+}
+
+/// The ground station is down while services come: once it is back its operator says that they
+/// are there.
+#[test]
+fn who_comes_while_the_ground_station_is_down_is_heard_of_when_it_is_back() {
+    let prepared = prepared("search", 3);
+    let mut faults = prepared.spec.faults.clone();
+    faults.push(TimedFault {
+        at_ms: 540_000,
+        fault: Fault::Kill { peer: 100 },
+    });
+    faults.push(TimedFault {
+        at_ms: 640_000,
+        fault: Fault::Restart {
+            peer: 100,
+            fresh_disk: false,
+        },
+    });
+    let outcome = run(&prepared, 4, faults, Wanted::default());
+    passed(&outcome);
+    let bus = &outcome.report.detections[0];
+    let served_ms = bus.served_ms.unwrap();
+    assert!((640_000..700_000).contains(&served_ms), "{}", bus.line());
+    assert!(outcome.report.end_ms < served_ms + 20_000, "{}", bus.line());
 }
 
 /// Of two buses the mission looks for the one that would be found later; a look in twenty takes
@@ -129,11 +179,12 @@ fn when_who_watches_what_was_found_is_killed_another_is_given_it_though_all_are_
         panic!("another goes there");
     };
     assert!(next != watches && swarm.beliefs(next).unwrap().relays);
-    // And sees it, for most of the ten minutes.
+    // And sees it, for most of the time until services are there.
     let outcome = run(&prepared, 4, faults, Wanted::default());
     passed(&outcome);
     let bus = &outcome.report.detections[0];
-    assert!(bus.sight_ms > 500_000, "{}", bus.line());
+    let wanted_ms = bus.served_ms.unwrap() - bus.told_ms;
+    assert!(bus.sight_ms + 60_000 > wanted_ms, "{}", bus.line());
 }
 
 #[test]

@@ -148,6 +148,7 @@ fn spec(s: &Stated, geometry: &MissionGeometry) -> Spec {
         min_separation_m: s.run.min_separation_m.max(s.fleet.separation_m),
         traffic_range_m: traffic_range_m(s, &geometry.mission),
         vehicles: s.vehicles.clone(),
+        services: s.services.clone(),
         contour: s.contour.clone(),
         crowd: s.crowd_there.clone(),
         faults: with_operator(s),

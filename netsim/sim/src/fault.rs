@@ -103,6 +103,11 @@ pub enum Fault {
         /// Which, by name.
         name: String,
     },
+    /// The operator says that a task was done on the ground.
+    DoneTask {
+        /// Which, by name.
+        name: String,
+    },
     /// The operator wants something of all UAVs, or of one: the ground station speaks it.
     Order {
         /// What.
@@ -204,6 +209,7 @@ impl Fault {
                     | Self::Rebase { .. }
                     | Self::AddTask { .. }
                     | Self::CancelTask { .. }
+                    | Self::DoneTask { .. }
             )
     }
 
@@ -235,6 +241,7 @@ impl Fault {
             | Self::RemoveZone { .. }
             | Self::AddTask { .. }
             | Self::CancelTask { .. }
+            | Self::DoneTask { .. }
             | Self::Loss { .. } => Vec::new(),
             Self::Order { uav, .. } => uav.iter().copied().collect(),
         }
@@ -278,6 +285,12 @@ impl fmt::Display for Fault {
                 write!(f, "the operator asks for the task {name}")
             }
             Self::CancelTask { name } => write!(f, "the operator wants the task {name} no more"),
+            Self::DoneTask { name } => {
+                write!(
+                    f,
+                    "the operator says that the task {name} was done on the ground"
+                )
+            }
             Self::Order { order, uav } => {
                 write!(f, "the operator says {}", order.name())?;
                 uav.map_or(Ok(()), |uav| write!(f, " to uav{uav}"))

@@ -128,6 +128,7 @@ impl<'a> Baseline<'a> {
             | Fault::RemoveZone { .. }
             | Fault::AddTask { .. }
             | Fault::CancelTask { .. }
+            | Fault::DoneTask { .. }
             | Fault::Order { .. }
             | Fault::FailStores { .. }
             | Fault::SlowStores { .. }

@@ -6,6 +6,7 @@ use crate::pursuit::vehicle::Behaviour;
 use crate::twins::Twins;
 use crate::weather::Weather;
 use skein_flight::airframe::Airframe;
+use skein_flight::streets::Network;
 use skein_flight::trajectory::timed::Objective;
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Pose};
@@ -57,6 +58,8 @@ pub struct Spec {
     pub traffic_range_m: f64,
     /// Vehicles on the ground, of which cameras see those in their pictures.
     pub vehicles: Vec<VehicleSpec>,
+    /// Services on the ground, which drive to what the ground station knows to be followed.
+    pub services: Vec<ServiceSpec>,
     /// A road or a fire that no peer knows, of which cameras see what is in their pictures.
     pub contour: Option<ContourSpec>,
     /// The people of a mass event, of whom cameras see those in their pictures.
@@ -152,6 +155,17 @@ pub struct VehicleSpec {
     pub kind: u8,
     /// In how many looks of a thousand a detector takes it for another kind.
     pub confused_permille: u16,
+}
+
+/// A unit of services on the ground.
+#[derive(Clone, Debug)]
+pub struct ServiceSpec {
+    /// Where it waits at first.
+    pub base: Point,
+    /// How fast it goes, m/s.
+    pub speed_mps: f64,
+    /// The streets along which it goes; straight where there are none.
+    pub streets: Option<Arc<Network>>,
 }
 
 /// A contour that no peer knows.

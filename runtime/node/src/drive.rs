@@ -20,7 +20,7 @@ use crate::world::{News, Tick, World};
 use skein_behaviors::order::SINGLES_MAX;
 use skein_behaviors::{Order, Orders, Percept};
 use skein_console::{Answer, Asked, Command as Request};
-use skein_peer::input::{AskedTask, TaskEdit};
+use skein_peer::input::{OperatorsTasks, TaskEdit};
 use skein_peer::mission::PointMm;
 use skein_peer::offload::{Job, JobResult, run};
 use skein_peer::witness::Witness;
@@ -71,9 +71,9 @@ pub trait PeerLogic: Send {
     fn way(&self, from: PointMm, to: PointMm) -> Result<String, String>;
     /// Whether the operator's words on tasks can be carried out; a sentence that says why not.
     fn check_task(&self, edit: &TaskEdit) -> Result<(), String>;
-    /// The tasks of its operator.
-    fn operators_tasks(&self) -> Vec<AskedTask>;
-    /// A number that grows with each change of these.
+    /// What its operator said of tasks.
+    fn operators_tasks(&self) -> OperatorsTasks;
+    /// A number that changes with that; 0 where it is nothing.
     fn tasks_version(&self) -> u64;
     /// What it says of its last percept, for a judge; none where there is nothing to judge.
     fn looked(&self) -> Option<Witness>;
@@ -136,7 +136,7 @@ impl PeerLogic for Peer {
         Peer::check_task(self, edit)
     }
 
-    fn operators_tasks(&self) -> Vec<AskedTask> {
+    fn operators_tasks(&self) -> OperatorsTasks {
         Peer::operators_tasks(self)
     }
 
@@ -554,6 +554,7 @@ where
         let told = match &edit {
             TaskEdit::Add(_) => "asked for",
             TaskEdit::Cancel(_) => "cancelled",
+            TaskEdit::Done(_) => "done",
             TaskEdit::Again(_) => {
                 return Err("tasks are said again by the ground station itself".to_owned());
             }
@@ -564,7 +565,7 @@ where
         let added = self.names_of_tasks().into_iter();
         let added: Vec<String> = added.filter(|n| !before.contains(n)).collect();
         let name = match edit {
-            TaskEdit::Cancel(name) => name,
+            TaskEdit::Cancel(name) | TaskEdit::Done(name) => name,
             TaskEdit::Add(task) => task.name.unwrap_or_else(|| added.join(", ")),
             TaskEdit::Again(_) => String::new(),
         };
@@ -572,7 +573,7 @@ where
     }
 
     fn names_of_tasks(&self) -> Vec<String> {
-        let tasks = self.peer.operators_tasks().into_iter();
+        let tasks = self.peer.operators_tasks().asked.into_iter();
         let open = tasks.filter(|t| t.task.is_open());
         open.map(|t| t.task.name()).collect()
     }
@@ -598,9 +599,9 @@ where
             return;
         }
         if !std::mem::replace(&mut self.tasks_told, true) {
-            let tasks = self.standing.as_ref().map_or(&[][..], Standing::tasks);
-            if !tasks.is_empty() {
-                let again = TaskEdit::Again(tasks.to_vec());
+            let tasks = self.standing.as_ref().map(Standing::tasks);
+            if let Some(tasks) = tasks.filter(|t| !t.is_empty()) {
+                let again = TaskEdit::Again(tasks);
                 self.step(Input::Command(Command::Task(again))).await;
             }
         }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use skein_behaviors::{Order, Orders};
 use skein_console::replace_private_file;
 use skein_peer::Mission;
-use skein_peer::input::AskedTask;
+use skein_peer::input::{AskedTask, DoneTask, OperatorsTasks};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -55,6 +55,8 @@ struct Kept {
     mission: Option<Arc<Mission>>,
     #[serde(default)]
     tasks: Vec<AskedTask>,
+    #[serde(default)]
+    done: Vec<DoneTask>,
 }
 
 impl Standing {
@@ -103,19 +105,23 @@ impl Standing {
         self.kept.mission.clone()
     }
 
-    /// The tasks that the operator asked for, as they were said last.
+    /// What the operator said of tasks, as it was said last.
     #[must_use]
-    pub fn tasks(&self) -> &[AskedTask] {
-        &self.kept.tasks
+    pub fn tasks(&self) -> OperatorsTasks {
+        OperatorsTasks {
+            asked: self.kept.tasks.clone(),
+            done: self.kept.done.clone(),
+        }
     }
 
     /// Keeps tasks.
     ///
     /// # Errors
     /// When it cannot be written; those before stand.
-    pub fn keep_tasks(&mut self, tasks: Vec<AskedTask>) -> Result<(), StandingError> {
+    pub fn keep_tasks(&mut self, tasks: OperatorsTasks) -> Result<(), StandingError> {
         self.keep(Kept {
-            tasks,
+            tasks: tasks.asked,
+            done: tasks.done,
             ..self.kept.clone()
         })
     }

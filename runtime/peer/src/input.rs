@@ -3,7 +3,7 @@
 use crate::mission::{Mission, PointMm};
 use crate::offload::JobResult;
 use crate::transmission::Transmission;
-use crate::wire::tasks::{Task, TaskKind};
+use crate::wire::tasks::{DoneTask, Task, TaskKind};
 use serde::{Deserialize, Serialize};
 use skein_behaviors::{Orders, Percept};
 use std::sync::Arc;
@@ -102,8 +102,28 @@ pub enum TaskEdit {
     Add(NewTask),
     /// One less, by name.
     Cancel(String),
-    /// Those of an earlier life are said again.
-    Again(Vec<AskedTask>),
+    /// What one asks for, by name, was done on the ground: whoever asked for it.
+    Done(String),
+    /// What was said in an earlier life is said again.
+    Again(OperatorsTasks),
+}
+
+/// What the operator of a ground station said of tasks, as it stands.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OperatorsTasks {
+    /// The tasks that it asked for.
+    pub asked: Vec<AskedTask>,
+    /// Tasks of others that it said to be done, ascending.
+    #[serde(default)]
+    pub done: Vec<DoneTask>,
+}
+
+impl OperatorsTasks {
+    /// Whether it said nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.asked.is_empty() && self.done.is_empty()
+    }
 }
 
 /// A task that is asked for.

@@ -21,8 +21,8 @@ use crate::footprint::Footprint;
 use crate::gathering::{Crowd, Sector};
 use crate::hint::{Hint, NoWay, WayHint};
 use crate::inbound::{self, Heard};
-use crate::input::{AskedTask, TaskEdit};
 use crate::input::{Command, Input, Time};
+use crate::input::{OperatorsTasks, TaskEdit};
 use crate::journal::{Durable, Entry};
 use crate::mission::{PointMm, point_m};
 use crate::offload::{Job, JobResult};
@@ -34,6 +34,7 @@ use crate::protocol::membership::{Change, Membership};
 use crate::protocol::negotiation::are_many;
 use crate::protocol::relay::{Offer, Relay};
 use crate::task_desk::TaskView;
+use crate::tasking::Call;
 use crate::timers::{Timer, Timers};
 use crate::transmission::Transmission;
 use crate::usage::Usages;
@@ -479,13 +480,21 @@ impl Peer {
     }
 
     /// The tasks of this ground station's operator with their numbers, and how long ago each
-    /// was asked for, milliseconds: what is to be said again in another life.
+    /// was asked for, milliseconds, and what it said to be done: what is to be said again in
+    /// another life.
     #[must_use]
-    pub fn operators_tasks(&self) -> Vec<AskedTask> {
+    pub fn operators_tasks(&self) -> OperatorsTasks {
         self.cooperation.tasking.asked(self.now)
     }
 
-    /// A number that grows with each change of its operator's tasks; 0 where there are none.
+    /// What services on the ground are wanted for: objects that are to be followed, as far as it
+    /// knows.
+    #[must_use]
+    pub fn calls(&self) -> Vec<Call> {
+        self.cooperation.tasking.calls(self.now)
+    }
+
+    /// A number that changes with what its operator said of tasks; 0 where that is nothing.
     #[must_use]
     pub fn tasks_version(&self) -> u64 {
         self.cooperation.tasking.asked_version()

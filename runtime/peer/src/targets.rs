@@ -5,6 +5,7 @@
 //! |---|---|
 //! | a look of the own camera | tracks are begun, kept or dropped; what is confirmed is put on the board |
 //! | a register of another | put on the board, if it is newer and of about now; if it is followed for a task, the task is bound to it |
+//! | a register of another, where there is no camera | of the task that it is followed for it is kept: services on the ground are called there |
 //! | an interval passes, while a task to follow is open | what was seen since is told: two registers at most, that which is followed first |
 //! | whom a task is bound to is not seen for a while, and another is seen where it may be | the task is bound to that |
 //! | a task is followed for the first time | it is bound to what is seen nearest to its place |
@@ -14,7 +15,7 @@
 //!
 //! # Guarantees
 //! Registers merge in any order: of each author and target the newest counts. All that is kept
-//! is bounded. Without sightings nothing is kept and nothing said.
+//! is bounded. Without sightings nothing is said, and without a camera nothing is joined.
 
 mod search;
 
@@ -95,6 +96,9 @@ const SAID: usize = 2;
 /// Tasks whose targets are kept in mind.
 const BOUND_MAX: usize = 32;
 
+/// What was heard of a target is driven on for so long, seconds.
+const DRIVEN_ON_S: f64 = 5.0;
+
 /// A task in a revision.
 pub(crate) type Sought = (TaskId, u32);
 
@@ -125,6 +129,8 @@ pub(crate) struct Targets {
     tracks: Tracks,
     board: Board,
     bound: BTreeMap<Sought, Bound>,
+    /// Without a camera, what was heard last of whom a task is to follow, and when.
+    heard: BTreeMap<Sought, (Time, Target)>,
     /// When each of its own targets was in the last looks that told it, the latest last.
     hits: BTreeMap<TargetName, [u64; HITS]>,
     /// The time of the last percept, milliseconds.
@@ -150,6 +156,7 @@ impl Targets {
             tracks: Tracks::new(me, DENSITY),
             board: Board::default(),
             bound: BTreeMap::new(),
+            heard: BTreeMap::new(),
             hits: BTreeMap::new(),
             now_ms: 0,
             subjects: [None; TARGETS_MAX as usize],
@@ -283,7 +290,10 @@ impl Targets {
     }
 
     /// What another UAV tells.
-    pub fn hear(&mut self, author: u16, told: &Target) {
+    pub fn hear(&mut self, now: Time, author: u16, told: &Target) {
+        if self.flies.is_none() {
+            return self.hear_without_camera(now, author, told);
+        }
         let is_now = told.seen_ms <= self.now_ms + AHEAD_MS;
         let is_old = told.seen_ms + 60_000 < self.now_ms;
         if self.now_ms == 0 || author == self.me || !is_now || is_old {
@@ -294,13 +304,7 @@ impl Targets {
         if !is_news || told.task_by == 0 {
             return;
         }
-        let sought = (
-            TaskId {
-                author: told.task_by,
-                number: told.task,
-            },
-            told.revision,
-        );
+        let sought = sought_of(told);
         let said = (told.seen_ms, author);
         let last = Fused {
             name: register.name,
@@ -325,6 +329,31 @@ impl Targets {
                 },
             );
         }
+    }
+
+    /// Who has no camera has no clock of percepts to join what was told by: of each task what it
+    /// heard last counts.
+    fn hear_without_camera(&mut self, now: Time, author: u16, told: &Target) {
+        if author == self.me || told.task_by == 0 {
+            return;
+        }
+        let sought = sought_of(told);
+        if self.heard.len() >= BOUND_MAX && !self.heard.contains_key(&sought) {
+            let oldest = self.heard.iter().min_by_key(|(_, (at, _))| *at);
+            if let Some(oldest) = oldest.map(|(k, _)| *k) {
+                self.heard.remove(&oldest);
+            }
+        }
+        self.heard.insert(sought, (now, *told));
+    }
+
+    /// Where whoever follows for a task was heard to have it, driven on for a few seconds: as a
+    /// peer without a camera knows it.
+    pub fn heard_at(&self, now: Time, sought: Sought) -> Option<Point> {
+        let (at, told) = self.heard.get(&sought)?;
+        let r = register_of(0, told);
+        let late_s = seconds(now.since_ms(*at)).min(DRIVEN_ON_S);
+        Some(r.estimate.position() + r.estimate.velocity_mps() * late_s)
     }
 
     fn bind(&mut self, sought: Sought, bound: Bound) {
@@ -468,6 +497,15 @@ impl Followed {
     pub fn is_lost(&self) -> bool {
         self.unseen_s > SEARCH_S
     }
+}
+
+/// Which task somebody follows for who told of a target.
+fn sought_of(told: &Target) -> Sought {
+    let task = TaskId {
+        author: told.task_by,
+        number: told.task,
+    };
+    (task, told.revision)
 }
 
 /// A target that stands.

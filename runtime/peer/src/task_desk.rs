@@ -3,7 +3,7 @@
 
 use crate::cooperation::Cooperation;
 use crate::effect::{Effect, Effects};
-use crate::input::{AskedTask, NewTask, TaskEdit, Time};
+use crate::input::{AskedTask, NewTask, OperatorsTasks, TaskEdit, Time};
 use crate::mission::Mission;
 use crate::tasking::{KEPT_FOR_COVER, Known, Tasking, why_nobody};
 use crate::wire::codec::Body;
@@ -13,6 +13,8 @@ use crate::wire::tasks::{
     check_task, is_task_name, sensor_name,
 };
 use serde::{Deserialize, Serialize};
+use skein_geometry::hash::Fnv;
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 /// What a peer knows of a task, for a person.
@@ -62,14 +64,17 @@ pub struct TaskHolder {
 }
 
 impl Tasking {
-    /// The tasks of this peer's own operator.
-    pub fn asked(&self, now: Time) -> Vec<AskedTask> {
+    /// What this peer's own operator said of tasks.
+    pub fn asked(&self, now: Time) -> OperatorsTasks {
         let asked = |(id, known): (&TaskId, &Known)| AskedTask {
             number: id.number,
             task: known.task.clone(),
             age_ms: now.since_ms(known.since),
         };
-        self.own().map(asked).collect()
+        OperatorsTasks {
+            asked: self.own().map(asked).collect(),
+            done: self.said_done().to_vec(),
+        }
     }
 
     /// A task that this peer asked for is wanted no more, by this revision of it.
@@ -91,9 +96,18 @@ impl Tasking {
         effects
     }
 
-    /// Grows with each change of the tasks of this peer's own operator.
+    /// Changes with the tasks of this peer's own operator, and with what it says to be done; 0
+    /// where there is neither.
     pub fn asked_version(&self) -> u64 {
-        self.own().map(|(_, k)| u64::from(k.task.revision)).sum()
+        let revisions = self.own().map(|(id, k)| (*id, k.task.revision));
+        let done = self.said_done().iter().map(|d| (d.task, d.revision));
+        let said: Vec<(TaskId, u32)> = revisions.chain(done).collect();
+        if said.is_empty() {
+            return 0;
+        }
+        let mut hash = Fnv::new();
+        said.hash(&mut hash);
+        Hasher::finish(&hash).max(1)
     }
 
     /// All tasks that are known.
@@ -187,6 +201,40 @@ impl Tasking {
             .map(|(id, known)| (*id, known))
     }
 
+    /// The open tasks that are called so, whoever asked for them.
+    fn open_named(&self, name: &str) -> Vec<TaskId> {
+        let all = self.known.iter();
+        let open = all.filter(|(_, k)| k.is_open() && k.task.name == name.as_bytes());
+        open.map(|(id, _)| *id).collect()
+    }
+
+    /// The one open task of a name, its operator's own first.
+    fn to_be_done(&self, name: &str) -> Result<TaskId, String> {
+        if let Some((id, _)) = self.named(name).filter(|(_, k)| k.is_open()) {
+            return Ok(id);
+        }
+        match &self.open_named(name)[..] {
+            [id] => Ok(*id),
+            [] => {
+                let all = self.known.values();
+                let is_over = all.into_iter().any(|k| k.task.name == name.as_bytes());
+                if is_over {
+                    return Err(format!("the task {name:?} is over already"));
+                }
+                let open = self.known.values().filter(|k| k.is_open());
+                let open: Vec<String> = open.map(|k| k.task.name()).collect();
+                Err(none_named(name, &open))
+            }
+            several => {
+                let by: Vec<String> = several.iter().map(|t| t.author.to_string()).collect();
+                Err(format!(
+                    "{} ask for a task {name:?}; only one that one of them asks for can be done",
+                    by.join(", ")
+                ))
+            }
+        }
+    }
+
     /// A task of this operator, and if it is the first for its target those who are to stay
     /// with that beside it.
     fn with_those_beside(&self, first: TaskId) -> Vec<TaskId> {
@@ -243,6 +291,15 @@ impl Tasking {
         let task = named.asked(number, revision)?;
         Ok((number, task))
     }
+}
+
+fn none_named(name: &str, open: &[String]) -> String {
+    let known = if open.is_empty() {
+        "none".to_owned()
+    } else {
+        open.join(", ")
+    };
+    format!("no open task is named {name:?}; there are: {known}")
 }
 
 /// Most UAVs that may be asked to stay with one target.
@@ -310,17 +367,10 @@ impl Cooperation {
                 None => {
                     let open = self.tasking.views(Time(0)).into_iter();
                     let open = open.filter(|t| t.state == TaskState::Open).map(|t| t.name);
-                    let open: Vec<String> = open.collect();
-                    let known = if open.is_empty() {
-                        "none".to_owned()
-                    } else {
-                        open.join(", ")
-                    };
-                    Err(format!(
-                        "no open task is named {name:?}; there are: {known}"
-                    ))
+                    Err(none_named(name, &open.collect::<Vec<String>>()))
                 }
             },
+            TaskEdit::Done(name) => self.tasking.to_be_done(name).map(|_| ()),
             TaskEdit::Again(_) => Ok(()),
         }
     }
@@ -357,13 +407,23 @@ impl Cooperation {
                 }
                 Ok(effects)
             }
-            TaskEdit::Again(tasks) => {
-                let mut effects = Effects::new();
+            TaskEdit::Done(name) => {
+                let first = self.tasking.to_be_done(name)?;
+                let own = first.author == author;
+                let all = if own {
+                    self.tasking.with_those_beside(first)
+                } else {
+                    vec![first]
+                };
+                Ok(self.tasking.done_on_ground(now, &all))
+            }
+            TaskEdit::Again(OperatorsTasks { asked, done }) => {
+                let mut effects = self.tasking.was_said_done(now, done);
                 for AskedTask {
                     number,
                     task,
                     age_ms,
-                } in tasks
+                } in asked
                 {
                     let id = TaskId {
                         author,

@@ -25,6 +25,7 @@ mod counts;
 mod crowds;
 mod detecting;
 mod relaying;
+mod serving;
 mod tracking;
 mod using;
 
@@ -50,12 +51,13 @@ use crate::wire::codec::Body;
 use crate::wire::limits::{DURATION_MAX_MS, PEERS_MAX};
 use crate::wire::message::{Member, Record};
 use crate::wire::tasks::{
-    Bundle, BundleTask, Offer, Progress, Task, TaskId, TaskKind, TaskState, sensor_name,
+    Bundle, BundleTask, DoneTask, Offer, Progress, Task, TaskId, TaskKind, TaskState, sensor_name,
 };
 use crate::{Incarnation, PeerId};
 pub use brought::{BROUGHT_MAX, MISSION};
 use relaying::Held;
 pub(crate) use relaying::KEPT_FOR_COVER;
+pub use serving::Call;
 use skein_behaviors::executive::detour::Watched;
 use skein_behaviors::{Order, Percept};
 use skein_flight::airframe::Airframe;
@@ -128,6 +130,8 @@ pub(crate) struct Tasking {
     pub(crate) gathering: Gathering,
     /// The version of the bundle that was spoken last.
     spoken: Option<Version>,
+    /// Tasks of others that this peer's operator said to be done, ascending.
+    said_done: Vec<DoneTask>,
     /// The life in which the tasks of this peer's operator were spoken.
     told_in: Incarnation,
     last_period: Time,
@@ -157,6 +161,7 @@ impl Tasking {
             using: Using::new(config.id.0),
             gathering: Gathering::new(config.id.0),
             spoken: None,
+            said_done: Vec::new(),
             told_in: 0,
             last_period: Time(0),
             last_again: Time(0),
@@ -224,7 +229,10 @@ impl Tasking {
         beliefs.follows = self.follows();
         beliefs.loads.extend(self.targets.loads());
         let held = self.auction.held().iter();
-        beliefs.tasks = held.map(|t| (t.task, t.revision, t.progress)).collect();
+        let said = self.said_done.iter();
+        let said = said.map(|d| (d.task, d.revision, Progress::Done));
+        let held = held.map(|t| (t.task, t.revision, t.progress));
+        beliefs.tasks = held.chain(said).collect();
         let hopeless = self.auction.unassigned();
         let open = self.known.iter().filter(|(_, k)| k.is_open());
         let open = open.filter(|(id, _)| !hopeless.contains(id));
@@ -259,7 +267,7 @@ impl Tasking {
     pub fn hear(&mut self, now: Time, record: &Record, body: &Body) -> Effects {
         match body {
             Body::Target(target) => {
-                self.targets.hear(record.author, target);
+                self.targets.hear(now, record.author, target);
                 Effects::new()
             }
             Body::Detection(told) => self.hear_detection(record, told),
@@ -311,10 +319,11 @@ impl Tasking {
         }
         let asked = task.revision_as_asked();
         let same = held.filter(|k| k.task.revision_as_asked() == asked);
-        let by = (task.state == TaskState::Done).then_some((task.done_by, now));
+        let by = (task.state == TaskState::Done).then_some(task.done_by);
+        let by = by.or_else(|| self.told_done(id, asked));
         let known = Known {
             since: same.map_or(now, |k| k.since),
-            done: same.and_then(|k| k.done).or(by),
+            done: same.and_then(|k| k.done).or(by.map(|by| (by, now))),
             hopeless_told: false,
             task,
         };
@@ -326,6 +335,15 @@ impl Tasking {
         self.known.insert(id, known);
         self.news.insert(id);
         vec![report, Effect::Negotiate]
+    }
+
+    /// Who said to have done a task before it was known.
+    fn told_done(&self, id: TaskId, revision: u32) -> Option<u16> {
+        let is_it = |b: &Bundle| done_in(b).contains(&(id, revision));
+        let mut all = self.bundles.iter();
+        let other = all.find(|(_, (_, b))| is_it(b)).map(|(peer, _)| peer.0);
+        let said = |d: &DoneTask| (d.task, d.revision) == (id, revision);
+        other.or_else(|| self.said_done.iter().any(said).then_some(self.me))
     }
 
     fn note_done(&mut self, now: Time, id: TaskId, revision: u32, by: u16) -> Option<Effect> {
@@ -383,10 +401,16 @@ impl Tasking {
             .filter_map(|id| Some((*id, &self.known.get(id)?.task)))
             .map(|(id, task)| report(id, task, TaskNews::Over(TaskState::Expired)))
             .collect();
+        let served = if s.speaks {
+            self.tell_served(s.now)
+        } else {
+            Effects::new()
+        };
         effects.extend(
             brought
                 .into_iter()
                 .chain(found)
+                .chain(served)
                 .chain(asked)
                 .filter(|e| !matches!(e, Effect::Negotiate)),
         );
@@ -750,6 +774,7 @@ impl Tasking {
             let say =
                 |(id, k): (&TaskId, &Known)| Effect::Speak(id.number, Body::Task(k.task.clone()));
             effects.extend(self.own().map(say));
+            effects.extend(self.bundle_of_done());
         }
         effects
     }

@@ -8,6 +8,7 @@
 //! simulator.
 
 use crate::config::Launch;
+use crate::input::OperatorsTasks;
 use crate::journal::Entry;
 use crate::mission::{Mission, mm};
 use crate::offload::{self, Job, JobResult};
@@ -483,6 +484,21 @@ impl Harness {
                 heard: Transmission::read(bytes).into(),
             },
         );
+    }
+
+    /// What the operator of a ground station said of tasks.
+    ///
+    /// # Panics
+    /// Where no process runs.
+    #[must_use]
+    pub fn operators_tasks(&self, id: u16) -> OperatorsTasks {
+        self.peer(id).unwrap().operators_tasks()
+    }
+
+    /// Whether a peer speaks.
+    #[must_use]
+    pub fn speaks(&self, id: u16) -> bool {
+        self.peer(id).is_some_and(|p| p.speaks_in().is_some())
     }
 
     /// The operator gives an order to all at a peer.

@@ -7,7 +7,7 @@ use crate::gathering::Sector;
 use crate::hint::Hint;
 use crate::input::AskedTask;
 use crate::mission::Mission;
-use crate::tasking::Follows;
+use crate::tasking::{Call, Follows};
 use crate::usage::StretchSum;
 use crate::wire::count::Count;
 use crate::wire::trail::Trail;
@@ -83,6 +83,8 @@ pub struct Known {
     pub crowd: Vec<(u16, Sector)>,
     /// The tasks of its operator.
     pub tasks: Vec<AskedTask>,
+    /// What it knows services on the ground to be wanted for.
+    pub calls: Vec<Call>,
 }
 
 impl Mission {
@@ -102,8 +104,8 @@ impl Peer {
         Some(Witness::Looked(Box::new(looked)))
     }
 
-    /// What it knows of what its mission watches, and of the tasks of its operator; none where
-    /// there is neither.
+    /// What it knows of what its mission watches, of the tasks of its operator, and of what
+    /// services on the ground are wanted for; none where there is none of these.
     #[must_use]
     pub fn known(&self, at_ms: u64) -> Option<Witness> {
         let known = self.all_known(at_ms)?;
@@ -132,16 +134,21 @@ impl Peer {
     }
 
     fn all_known(&self, at_ms: u64) -> Option<Known> {
-        let tasks = self.operators_tasks();
-        let watches = self.followed().is_some_and(Mission::watches);
-        if !watches && tasks.is_empty() {
+        let tasks = self.operators_tasks().asked;
+        let is_ground = self.is_ground_station();
+        let mission = self.followed();
+        let looks_out = is_ground && mission.is_some_and(|m| !m.detections.is_empty());
+        let calls = if looks_out { self.calls() } else { Vec::new() };
+        let watches = mission.is_some_and(Mission::watches);
+        if !watches && !looks_out && tasks.is_empty() {
             return None;
         }
         let mut known = Known {
             at_ms,
             life: self.speaks_in(),
-            is_ground: self.is_ground_station(),
+            is_ground,
             tasks,
+            calls,
             ..Known::default()
         };
         if watches {

@@ -12,6 +12,7 @@ pub(crate) mod layers;
 pub(crate) mod operator;
 pub(crate) mod radio;
 pub(crate) mod run;
+mod services;
 mod shared;
 pub(crate) mod streets;
 pub(crate) mod targets;
@@ -38,7 +39,7 @@ use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{
-    ContourSpec, CrowdSpec, GroundStationSpec, RadioSpec, StormSpec, VehicleSpec,
+    ContourSpec, CrowdSpec, GroundStationSpec, RadioSpec, ServiceSpec, StormSpec, VehicleSpec,
 };
 use skein_netsim::weather::Weather;
 use skein_peer::count_site::CountSite;
@@ -83,6 +84,7 @@ const FIELDS: &[&str] = &[
     "faults",
     "operator",
     "vehicles",
+    "services",
     "contour",
     "crowd",
     "storm",
@@ -130,6 +132,8 @@ pub(crate) struct Stated {
     pub(crate) operator: Vec<operator::Act>,
     /// Vehicles on the ground.
     pub(crate) vehicles: Vec<VehicleSpec>,
+    /// Services on the ground.
+    pub(crate) services: Vec<ServiceSpec>,
     /// A road or a fire that no peer knows.
     pub(crate) contour: Option<ContourSpec>,
     /// The people of a mass event.
@@ -180,6 +184,10 @@ pub(crate) fn scenario(
     let vehicles = f.get("vehicles").map_or_else(
         || Ok(Vec::new()),
         |list| vehicles::read(list, (terrain.origin, files), &mut notices),
+    )?;
+    let services = f.get("services").map_or_else(
+        || Ok(Vec::new()),
+        |list| services::read(list, (terrain.origin, files), ground_id, &mut notices),
     )?;
     let streets = f.get("mission").map_or(Ok(None), |node| {
         streets::of_mission(node, (terrain.origin, files), &terrain.area, &mut notices)
@@ -238,6 +246,7 @@ pub(crate) fn scenario(
         faults,
         operator,
         vehicles,
+        services,
         contour: f.get("contour").map(contour::read).transpose()?,
         crowd_there: f.get("crowd").map(crowd::read).transpose()?,
         findings,

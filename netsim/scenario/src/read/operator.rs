@@ -20,7 +20,14 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// What the operator can do, one at a time.
-const DOINGS: [&str; 5] = ["nfz_add", "nfz_remove", "task_add", "task_cancel", "order"];
+const DOINGS: [&str; 6] = [
+    "nfz_add",
+    "nfz_remove",
+    "task_add",
+    "task_cancel",
+    "task_done",
+    "order",
+];
 
 /// What the operator does at some time, and where the file says so.
 #[derive(Clone, Debug)]
@@ -59,6 +66,9 @@ pub(crate) fn read(
             },
             "task_add" => tasks::added(node)?,
             "task_cancel" => Fault::CancelTask {
+                name: tasks::task_name(node)?,
+            },
+            "task_done" => Fault::DoneTask {
                 name: tasks::task_name(node)?,
             },
             _ => Fault::Order {
@@ -135,7 +145,7 @@ pub(crate) fn check(acts: &[Act], spec: &Spec, places: &Places) -> Result<(), Er
                 can_be_done(task, &mission, spec).map_err(wrong)?;
                 continue;
             }
-            Fault::CancelTask { name } => {
+            Fault::CancelTask { name } | Fault::DoneTask { name } => {
                 if !asked.contains(name) {
                     return Err(wrong(format!("no task {name:?} was asked for before")));
                 }

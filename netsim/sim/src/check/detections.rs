@@ -1,6 +1,7 @@
 //! Objects that a mission looks for, against the vehicles of the world: what one had in its
 //! picture for long enough and fits is told (`detect-missed`), what is told is there
-//! (`detect-false`), and no two follow one vehicle for two tasks for long (`detect-twice`).
+//! (`detect-false`), no two follow one vehicle for two tasks for long (`detect-twice`), and nobody
+//! for long what services on the ground have reached (`detect-served`).
 //!
 //! Not seen: whether an object that may be taken for one that was told before should have been
 //! told as well; and whether a word of looks is right where the world lets cameras confuse them.
@@ -33,8 +34,9 @@ const UNSURE_MMPS: u32 = 1_000;
 /// What is told of longer ago is not looked at: the world has no past, milliseconds.
 const LATE_MS: u64 = 3_000;
 
-/// Two may follow one vehicle for so long until one of them knows, milliseconds.
-const TWICE_MS: u64 = 60_000;
+/// Two may follow one vehicle, or one what is served, for so long until one of them knows,
+/// milliseconds.
+const KNOWN_MS: u64 = 60_000;
 
 /// A vehicle is the one that is meant if it is no farther from where it is said to be, metres.
 const MEANT_M: f64 = 40.0;
@@ -80,6 +82,9 @@ pub struct DetectionReport {
     pub followed_ms: Option<u64>,
     /// For how long, ms.
     pub sight_ms: u64,
+    /// When services on the ground had reached it, ms.
+    #[serde(default)]
+    pub served_ms: Option<u64>,
 }
 
 impl DetectionReport {
@@ -113,6 +118,9 @@ impl DetectionReport {
         } else if self.to_follow {
             line += ", not followed";
         }
+        if let Some(at_ms) = self.served_ms {
+            line += &format!(", services there at {:.1} s", s(at_ms));
+        }
         line
     }
 }
@@ -134,6 +142,9 @@ struct Told {
     report: DetectionReport,
 }
 
+/// A task and the revision in which it was asked for.
+type Asked = (TaskId, u32);
+
 /// What came of all in one run.
 #[derive(Clone, Debug, Default)]
 pub struct DetectionCheck {
@@ -145,6 +156,9 @@ pub struct DetectionCheck {
     pictured: BTreeMap<(u16, usize), Pictured>,
     first_ms: BTreeMap<usize, u64>,
     twice: Clocks<(u16, u16, usize)>,
+    /// What services have reached, by the task in its revision: since when, and by whose word.
+    served: BTreeMap<Asked, (u64, u16)>,
+    kept: Clocks<(u16, Asked)>,
     last_ms: u64,
 }
 
@@ -258,13 +272,25 @@ impl DetectionCheck {
 
     /// Somebody says that it follows what was told, where nobody looks into the peers.
     pub fn on_follows(&mut self, now_ms: u64, task: TaskId) {
-        let key = (task.author, task.number);
-        let all = self
-            .told
-            .range_mut((key.0, key.1, 0)..=(key.0, key.1, u64::MAX));
-        if let Some((_, t)) = all.into_iter().next_back() {
+        if let Some(t) = self.latest(task) {
             t.report.followed_ms.get_or_insert(now_ms);
         }
+    }
+
+    /// Services on the ground have reached what a task is to follow, by the word of a ground
+    /// station.
+    pub fn on_served(&mut self, said: (u64, u16), task: Asked) {
+        self.served.entry(task).or_insert(said);
+        if let Some(t) = self.latest(task.0) {
+            t.report.served_ms.get_or_insert(said.0);
+        }
+    }
+
+    /// What was told in a register; of one that was used again the latest.
+    fn latest(&mut self, task: TaskId) -> Option<&mut Told> {
+        let (author, number) = (task.author, task.number);
+        let all = (author, number, 0)..=(author, number, u64::MAX);
+        self.told.range_mut(all).next_back().map(|(_, t)| t)
     }
 
     /// Looks at all UAVs, beside where the vehicles are.
@@ -309,6 +335,7 @@ impl DetectionCheck {
         }
         self.find_missed(now_ms, truth, &followed, around, found);
         self.find_twice(now_ms, (truth, looks), around, found);
+        self.find_kept(now_ms, looks, around, found);
         self.note_sight((now_ms, passed_ms), truth, looks);
     }
 
@@ -440,7 +467,7 @@ impl DetectionCheck {
             now.insert(key);
             let joined_ms = around.stability.component_since_ms(a.0).unwrap_or(now_ms);
             let from_ms = self.twice.start(key, now_ms).max(joined_ms);
-            let bound_ms = around.handicaps.grown_ms(TWICE_MS, from_ms, now_ms);
+            let bound_ms = around.handicaps.grown_ms(KNOWN_MS, from_ms, now_ms);
             if now_ms.saturating_sub(from_ms) > bound_ms && self.twice.tell_once(key) {
                 found.broken("detect-twice", now_ms, Some(b.0), || {
                     format!(
@@ -453,20 +480,46 @@ impl DetectionCheck {
         self.twice.retain(|k| now.contains(k));
     }
 
-    /// For how long what was told is followed and in sight.
-    fn note_sight(&mut self, (now_ms, passed_ms): (u64, u64), truth: &[Truth], looks: &[Look]) {
-        let mut sees: BTreeSet<(u16, u16)> = BTreeSet::new();
-        for l in looks {
-            if let (Some(says), Some(_)) = (l.says, meant(l, truth)) {
-                sees.insert((says.task.author, says.task.number));
+    /// Who follows what services on the ground have reached.
+    fn find_kept(&mut self, now_ms: u64, looks: &[Look], around: Around<'_>, found: &mut Findings) {
+        let mut now = BTreeSet::new();
+        for look in looks {
+            let Some(task) = look.says.map(|s| (s.task, s.revision)) else {
+                continue;
+            };
+            let said = self.served.get(&task);
+            let Some((served_ms, _)) = said.filter(|(_, by)| around.graph.joined(look.uav, *by))
+            else {
+                continue;
+            };
+            let key = (look.uav, task);
+            now.insert(key);
+            let joined_ms = around.stability.component_since_ms(look.uav);
+            let joined_ms = joined_ms.unwrap_or(now_ms).max(*served_ms);
+            let from_ms = self.kept.start(key, now_ms).max(joined_ms);
+            let bound_ms = around.handicaps.grown_ms(KNOWN_MS, from_ms, now_ms);
+            if now_ms.saturating_sub(from_ms) > bound_ms && self.kept.tell_once(key) {
+                found.broken("detect-served", now_ms, Some(look.uav), || {
+                    format!(
+                        "follows for the task {}.{} what services on the ground reached at {served_ms} ms",
+                        task.0.author, task.0.number
+                    )
+                });
             }
         }
-        // A register that was used again is that of the latest.
-        for (author, number) in sees {
-            let all = self
-                .told
-                .range_mut((author, number, 0)..=(author, number, u64::MAX));
-            if let Some((_, t)) = all.into_iter().next_back() {
+        self.kept.retain(|k| now.contains(k));
+    }
+
+    /// For how long what was told is followed and in sight.
+    fn note_sight(&mut self, (now_ms, passed_ms): (u64, u64), truth: &[Truth], looks: &[Look]) {
+        let mut sees: BTreeSet<TaskId> = BTreeSet::new();
+        for l in looks {
+            if let (Some(says), Some(_)) = (l.says, meant(l, truth)) {
+                sees.insert(says.task);
+            }
+        }
+        for task in sees {
+            if let Some(t) = self.latest(task) {
                 if t.report.followed_ms.is_some() {
                     t.report.sight_ms += passed_ms;
                 }

@@ -68,6 +68,8 @@ pub(crate) struct Vehicle {
     /// Stands, or drives on, until then, seconds.
     until_s: f64,
     stands: bool,
+    /// It was stopped, and stays where it is.
+    is_stopped: bool,
     random: SplitMix64,
 }
 
@@ -114,8 +116,14 @@ impl Vehicle {
             corner: None,
             until_s: first_s,
             stands: behaviour == Behaviour::Parked,
+            is_stopped: false,
             random,
         }
+    }
+
+    /// It brakes, and stays where it comes to stand.
+    pub(crate) fn stop(&mut self) {
+        (self.is_stopped, self.stands) = (true, true);
     }
 
     pub(super) fn velocity_mps(&self) -> Vector {
@@ -166,7 +174,7 @@ impl Vehicle {
 
     fn decide(&mut self, now_s: f64) {
         let moves_on = matches!(self.behaviour, Behaviour::StopsAndGoes | Behaviour::Evades);
-        if now_s < self.until_s || !moves_on {
+        if now_s < self.until_s || !moves_on || self.is_stopped {
             return;
         }
         self.stands = !self.stands;

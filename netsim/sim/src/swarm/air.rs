@@ -13,6 +13,7 @@ use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::CellId;
 use skein_flight::coverage::ring::patch::Corners;
 use skein_link::medium::Links;
+use skein_peer::Call;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::protocol::airtime::{FRAME_BYTES, OVERHEAD_BYTES, PART_BYTES};
 use std::collections::BTreeSet;
@@ -202,6 +203,11 @@ impl Air {
     #[must_use]
     pub fn links(&self) -> &LinkTable {
         &self.links
+    }
+
+    /// The ground station calls services on the ground; gives those calls that are served.
+    pub fn dispatch(&mut self, calls: &[Call]) -> Vec<Call> {
+        self.world.dispatch(calls)
     }
 
     /// The judge and its score.

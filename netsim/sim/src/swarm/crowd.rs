@@ -89,7 +89,7 @@ impl Swarm {
         if !is_own || self.checker.rules.crowds.is_idle() || peer.is_ground_station() {
             return;
         }
-        let asked = peer.operators_tasks().into_iter();
+        let asked = peer.operators_tasks().asked.into_iter();
         let asked = asked.filter(|t| t.number == task.number && t.task.is_open());
         for asked in asked.filter(|t| t.task.kind == TaskKind::Pinpoint) {
             let pieces = self.operator.mission().pieces_of(&asked.task);

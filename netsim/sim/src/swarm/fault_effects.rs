@@ -98,6 +98,10 @@ impl Swarm {
                 self.edit_task(TaskEdit::Cancel(name.clone()));
                 0
             }
+            Fault::DoneTask { name } => {
+                self.edit_task(TaskEdit::Done(name.clone()));
+                0
+            }
             Fault::Order { order, uav } => {
                 self.operator.order(*uav, *order);
                 self.checker.rules.on_order(*order);

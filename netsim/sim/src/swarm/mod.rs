@@ -65,6 +65,7 @@ use sim_peer::{Process, SimPeer};
 use skein_behaviors::Order;
 use skein_geometry::frame::{Point, Pose};
 use skein_link::medium::key_hash;
+use skein_peer::input::TaskEdit;
 use skein_peer::journal::Entry;
 use skein_peer::offload::{Job, JobResult};
 use skein_peer::output::TaskNews;
@@ -924,13 +925,14 @@ impl Swarm {
         for edit in self.operator.task_edits(self.now_ms, speaks_in) {
             self.feed(idx, Input::Command(Command::Task(edit)));
         }
+        self.serve(idx);
         let Some(peer) = self.peers[idx].peer.as_ref() else {
             return;
         };
         let tasks = peer.operators_tasks();
         let mission = self.operator.mission();
         let brought = mission.brought(false);
-        for asked in tasks.iter().chain(&brought) {
+        for asked in tasks.asked.iter().chain(&brought) {
             self.account.asked(self.now_ms, asked);
             self.checker.rules.relays.on_asked(asked);
             self.checker.rules.tracks.on_asked(asked);
@@ -939,6 +941,29 @@ impl Swarm {
             }
         }
         self.operator.note_tasks(self.now_ms, tasks);
+    }
+
+    /// Services on the ground go where the ground station calls them, and its operator says that
+    /// they are there.
+    fn serve(&mut self, ground: usize) {
+        if self.spec.services.is_empty() {
+            return;
+        }
+        let peer = self.peers[ground].peer.as_ref();
+        let Some(peer) = peer.filter(|p| p.speaks_in().is_some()) else {
+            return;
+        };
+        for call in self.air.dispatch(&peer.calls()) {
+            let station = self.peers[ground].id();
+            let rules = &mut self.checker.rules;
+            rules
+                .detections
+                .on_served((self.now_ms, station), (call.task, call.revision));
+            self.feed(
+                ground,
+                Input::Command(Command::Task(TaskEdit::Done(call.name))),
+            );
+        }
     }
 
     /// How many cells were seen of which the ground station does not know.

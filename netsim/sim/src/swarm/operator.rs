@@ -2,7 +2,7 @@
 //! that are asked for.
 
 use skein_behaviors::{Order, Orders};
-use skein_peer::input::{AskedTask, TaskEdit};
+use skein_peer::input::{AskedTask, OperatorsTasks, TaskEdit};
 use skein_peer::{Incarnation, Mission};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -20,9 +20,9 @@ pub(super) struct Operator {
     spoken: Vec<u8>,
     /// What was not said of tasks yet.
     edits: VecDeque<TaskEdit>,
-    /// The tasks as the ground station held them last, when that was, milliseconds, and in
-    /// which life it was told of them.
-    tasks: Vec<AskedTask>,
+    /// What was said of tasks as the ground station held it last, when that was, milliseconds,
+    /// and in which life it was told of it.
+    tasks: OperatorsTasks,
     tasks_at_ms: u64,
     tasks_in: Option<Incarnation>,
     /// Since when somebody waits who cannot be told to go on, milliseconds.
@@ -36,7 +36,7 @@ impl Operator {
             orders: None,
             spoken: Vec::new(),
             edits: VecDeque::new(),
-            tasks: Vec::new(),
+            tasks: OperatorsTasks::default(),
             tasks_at_ms: 0,
             tasks_in: None,
             stranded_ms: None,
@@ -100,13 +100,16 @@ impl Operator {
                 age_ms: t.age_ms + now_ms.saturating_sub(self.tasks_at_ms),
                 ..t.clone()
             };
-            TaskEdit::Again(self.tasks.iter().map(older).collect())
+            TaskEdit::Again(OperatorsTasks {
+                asked: self.tasks.asked.iter().map(older).collect(),
+                done: self.tasks.done.clone(),
+            })
         });
         again.into_iter().chain(self.edits.drain(..)).collect()
     }
 
     /// The tasks as the ground station holds them now.
-    pub(super) fn note_tasks(&mut self, now_ms: u64, tasks: Vec<AskedTask>) {
+    pub(super) fn note_tasks(&mut self, now_ms: u64, tasks: OperatorsTasks) {
         if !tasks.is_empty() {
             (self.tasks, self.tasks_at_ms) = (tasks, now_ms);
         }
@@ -114,7 +117,7 @@ impl Operator {
 
     /// The tasks as the ground station held them last.
     pub(super) fn tasks(&self) -> &[AskedTask] {
-        &self.tasks
+        &self.tasks.asked
     }
 
     /// The orders that the ground station is to say in the life in which it speaks, once.

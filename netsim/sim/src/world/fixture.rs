@@ -140,6 +140,7 @@ pub fn square(n_uavs: u16) -> Spec {
         max_visit_s: None,
         traffic_range_m: 0.0,
         vehicles: Vec::new(),
+        services: Vec::new(),
         contour: None,
         crowd: None,
         faults: Vec::new(),

@@ -20,6 +20,7 @@ mod no_fly;
 pub mod obstacles;
 pub mod pieces;
 mod separation;
+pub mod services;
 pub mod survey;
 mod task_board;
 pub mod vehicles;
@@ -39,12 +40,13 @@ use contour::Contour;
 use crowd::Crowd;
 use launcher::Launchers;
 use motion::{Kinematic, Piece};
+use services::Services;
 use skein_behaviors::traffic::{Sighting as Seen, Traffic};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::patch::{Corners, Patches};
 use skein_peer::mission::mm;
 use skein_peer::offload::MissionGeometry;
-use skein_peer::{CoverageTask, Mission};
+use skein_peer::{Call, CoverageTask, Mission};
 use std::collections::BTreeSet;
 use std::iter;
 use std::sync::Arc;
@@ -157,6 +159,7 @@ pub struct World {
     traffic_range_m: f64,
     judge: Judge,
     vehicles: Vehicles,
+    services: Services,
     weather: Weather,
     launchers: Option<Launchers>,
     contour: Option<Contour>,
@@ -239,6 +242,7 @@ impl World {
             traffic_range_m: spec.traffic_range_m,
             judge,
             vehicles: Vehicles::new(&spec.vehicles, seed),
+            services: Services::new(&spec.services),
             weather: spec.wind.clone(),
             launchers,
             contour: spec.contour.as_ref().map(|c| Contour::new(c, seed)),
@@ -493,6 +497,18 @@ impl World {
         &self.vehicles
     }
 
+    /// The services on the ground.
+    #[must_use]
+    pub fn services(&self) -> &Services {
+        &self.services
+    }
+
+    /// The ground station calls services on the ground to these; gives those of them that are
+    /// served.
+    pub fn dispatch(&mut self, calls: &[Call]) -> Vec<Call> {
+        self.services.called(calls)
+    }
+
     /// Which of them are in the picture of a UAV, unhidden, now.
     pub fn pictured(&self, uav: u16) -> impl Iterator<Item = usize> + '_ {
         let body = self
@@ -641,6 +657,7 @@ impl World {
             }
         }
         self.vehicles.drive(to_ms, &self.airborne);
+        self.services.drive(to_ms, &mut self.vehicles);
         self.judge.separate(
             to_ms,
             &self.airborne,

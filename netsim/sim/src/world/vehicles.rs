@@ -100,6 +100,17 @@ impl Vehicles {
         }
     }
 
+    /// Stops the nearest within so many metres of a place that looks so, or may be taken to, if
+    /// there is one.
+    pub(super) fn stop_near(&mut self, place: Point, within_m: f64, looks: u8) -> bool {
+        let all = self.all.iter_mut().zip(self.specs.iter());
+        let may_be = all.filter(|(_, s)| s.kind == looks || s.confused_permille > 0);
+        let off = may_be.map(|(v, _)| ((v.at - place).norm(), v));
+        let near = off.filter(|(m, _)| *m <= within_m);
+        let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.map(|(_, v)| v.stop()).is_some()
+    }
+
     /// Whether one of them is in the picture of a UAV, and nothing stands in between.
     #[must_use]
     pub(super) fn is_pictured(&self, nth: usize, body: &Kinematic, obstacles: &Obstacles) -> bool {

@@ -137,8 +137,8 @@ impl PeerLogic for Double {
         Ok(())
     }
 
-    fn operators_tasks(&self) -> Vec<AskedTask> {
-        Vec::new()
+    fn operators_tasks(&self) -> OperatorsTasks {
+        OperatorsTasks::default()
     }
 
     fn tasks_version(&self) -> u64 {

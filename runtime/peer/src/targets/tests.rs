@@ -93,10 +93,10 @@ fn what_is_followed_is_told_with_its_task_and_found_by_who_hears_it() {
     assert!(one.tell(Time(60_500), 1_000, Some(TASK)).is_empty());
     assert_eq!(said(&one.tell(Time(62_000), 1_000, Some(TASK))).len(), 1);
     // The other is elsewhere, and sees nothing of it.
-    two.hear(1, &target);
+    two.hear(Time(0), 1, &target);
     assert_eq!(two.known(TASK), None, "it has no clock yet");
     two.on_percept(&percept(9_100, Point::new(900.0, 900.0), &[]));
-    two.hear(1, &target);
+    two.hear(Time(0), 1, &target);
     let known = two.known(TASK).unwrap();
     let truth = Point::new(100.0 + 9_100.0 / 200.0, 50.0);
     assert!((known.motion.position - truth).norm() < 5.0, "{known:?}");
@@ -119,7 +119,7 @@ fn of_registers_the_newest_counts_whatever_the_order() {
     let heard = |order: &[Target]| {
         let mut two = targets(2);
         two.on_percept(&percept(6_000, Point::new(900.0, 900.0), &[]));
-        order.iter().for_each(|t| two.hear(1, t));
+        order.iter().for_each(|t| two.hear(Time(0), 1, t));
         two.known(TASK)
     };
     let both = heard(&[first, second]);
@@ -140,7 +140,7 @@ fn what_is_of_another_time_or_no_covariance_is_left_out() {
         seen_ms: 7_000,
         ..told
     };
-    two.hear(1, &ahead);
+    two.hear(Time(0), 1, &ahead);
     two.hear(2, &told);
     assert_eq!(two.known(TASK), None);
     for (author, number) in (3..200).zip(0..) {
@@ -208,4 +208,34 @@ fn who_is_lost_is_looked_for_all_over_and_taken_up_again_where_it_may_be() {
     let place = Point::new(300.0, 300.0);
     let aim = other.look_for((TASK, place, 4.0), &looked, &|_| true);
     assert!((aim.unwrap().position - place).norm() < 100.0);
+}
+
+#[test]
+fn who_has_no_camera_knows_where_a_target_was_heard_to_be_last() {
+    let mut ground = Targets::new(100, None);
+    let told = |seen_ms: u64, task: u16, east_mm: i32| Target {
+        task_by: 2,
+        task,
+        revision: 1,
+        seen_ms,
+        east_mm,
+        east_mmps: 4_000,
+        ..Target::default()
+    };
+    let of = |number| (TaskId { author: 2, number }, 1);
+    let at = |ground: &Targets, ms, number| ground.heard_at(Time(ms), of(number)).map(|p| p.x);
+    assert_eq!(at(&ground, 0, 3), None);
+    ground.hear(Time(1_000), 2, &told(50_000, 3, 10_000));
+    ground.hear(Time(1_000), 2, &told(50_000, 0, 99_000));
+    assert_eq!(at(&ground, 1_000, 3), Some(10.0));
+    assert_eq!(at(&ground, 3_000, 3), Some(18.0));
+    // Not for long, and not once another was heard.
+    assert_eq!(at(&ground, 60_000, 3), Some(30.0));
+    ground.hear(Time(2_000), 4, &told(51_000, 3, 16_000));
+    assert_eq!(at(&ground, 2_000, 3), Some(16.0));
+    // Bounded, and what was heard longest ago goes first.
+    for n in 10..10 + 2 * BOUND_MAX as u16 {
+        ground.hear(Time(u64::from(n) * 1_000), 2, &told(52_000, n, 0));
+    }
+    assert_eq!((ground.heard.len(), at(&ground, 0, 3)), (BOUND_MAX, None));
 }

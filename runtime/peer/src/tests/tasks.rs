@@ -1,7 +1,7 @@
 //! Tasks other than coverage, asked for in flight: who does them, what is said, and that all
 //! cells are seen all the same.
 
-use super::{covered, with_operator};
+use super::{covered, record, with_operator};
 use crate::Input;
 use crate::input::{Command, NewTask, TaskEdit};
 use crate::mission::mm;
@@ -9,6 +9,7 @@ use crate::output::{Report, TaskNews};
 use crate::task_desk::TaskView;
 use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::why::Reason;
+use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
 use crate::wire::tasks::{TaskKind, TaskState};
 
@@ -226,6 +227,7 @@ fn words_that_cannot_be_carried_out_are_refused_with_the_reason() {
             "is no name of a task",
         ),
         (TaskEdit::Cancel("door".into()), "there are: gate"),
+        (TaskEdit::Done("door".into()), "there are: gate"),
         (
             TaskEdit::Add(NewTask {
                 radius_mm: 90_000,
@@ -279,4 +281,74 @@ fn who_cancels_the_first_task_of_a_target_cancels_those_beside_it() {
     assert_eq!(open(&h), [true, false, true, true]);
     edit(&mut h, TaskEdit::Cancel("car".into()));
     assert_eq!(open(&h), [false, false, false, true]);
+}
+
+#[test]
+fn what_was_done_on_the_ground_nobody_flies_for() {
+    let mut h = with_operator(2, mission(1, 8, 4));
+    h.run_s(20);
+    add(&mut h, point("far", 2_500.0, 0.0));
+    let flies = |h: &Harness| {
+        let works = |id| h.why(id).work.unwrap().reason == Reason::Task;
+        works(1) || works(2)
+    };
+    assert!(h.run_until(20, flies));
+    edit(&mut h, TaskEdit::Done("far".into()));
+    assert!(h.run_until(15, |h| !flies(h)));
+    h.run_s(3);
+    for id in [1, 2, GROUND_STATION] {
+        let told = view(&h, id, "far").unwrap();
+        assert_eq!(
+            (told.state, told.done_by),
+            (TaskState::Done, Some(GROUND_STATION))
+        );
+    }
+    edit(&mut h, TaskEdit::Done("far".into()));
+    assert!(
+        h.alarms(GROUND_STATION)
+            .pop()
+            .unwrap()
+            .contains("is over already")
+    );
+    assert!(h.run_until(600, |h| all_finished(h, [1, 2])));
+    assert_eq!(doers(&mut h, 2, "far"), Vec::<u16>::new());
+}
+
+/// What a UAV that is gone asked for stays done when the station that said so begins anew, and
+/// for whoever hears of the task later.
+#[test]
+fn what_was_said_to_be_done_stays_so_over_lives() {
+    let mut h = with_operator(2, mission(1, 8, 4));
+    h.run_s(20);
+    let task = NewTask {
+        kind: TaskKind::Track,
+        radius_mm: 0,
+        ..point("bus-9.0", 300.0, 100.0)
+    };
+    let asks = record(9, 1, 1, 0, &Body::Task(task.asked(0, 1).unwrap()));
+    for id in [1, GROUND_STATION] {
+        h.inject(id, asks.clone());
+    }
+    assert_eq!(state(&h, GROUND_STATION, "bus-9.0"), Some(TaskState::Open));
+    edit(&mut h, TaskEdit::Done("bus-9.0".into()));
+    let said = h.operators_tasks(GROUND_STATION);
+    assert_eq!((said.asked.len(), said.done.len()), (0, 1));
+    h.run_s(5);
+    h.inject(2, asks.clone());
+    assert_eq!(state(&h, 2, "bus-9.0"), Some(TaskState::Done));
+    // Both begin another life, and hear of the task before they hear that it is done, or after.
+    h.stop(GROUND_STATION);
+    h.stop(2);
+    h.run_s(3);
+    h.start(GROUND_STATION);
+    h.start(2);
+    assert!(h.run_until(30, |h| h.speaks(GROUND_STATION) && h.speaks(2)));
+    h.inject(2, asks.clone());
+    assert_eq!(state(&h, 2, "bus-9.0"), Some(TaskState::Open));
+    edit(&mut h, TaskEdit::Again(said.clone()));
+    assert!(h.operators_tasks(GROUND_STATION) == said);
+    assert!(h.run_until(10, |h| state(h, 2, "bus-9.0") == Some(TaskState::Done)));
+    h.inject(GROUND_STATION, asks);
+    assert_eq!(state(&h, GROUND_STATION, "bus-9.0"), Some(TaskState::Done));
+    assert!(h.run_until(600, |h| all_finished(h, [1, 2])));
 }

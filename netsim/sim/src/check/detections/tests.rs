@@ -207,6 +207,40 @@ fn two_who_follow_one_vehicle_for_two_tasks_are_found() {
 }
 
 #[test]
+fn who_goes_on_following_what_services_have_reached_is_found() {
+    let kept = |follows_s: u64, served: Option<TaskId>| {
+        let mut story = Story::new(cars());
+        story.tell(1, 1, &told(1_000, 0.0), &[car(0.0)]);
+        for s in 1..=100 {
+            if s == 5
+                && let Some(task) = served
+            {
+                story.check.on_served((5_000, 2), (task, 1));
+            }
+            let follows = if s < follows_s {
+                following(1, 1, &[0])
+            } else {
+                look(1, &[0])
+            };
+            story.looks(s, &[car(0.0)], &[follows, look(2, &[])]);
+        }
+        (
+            story.broke("detect-served"),
+            story.check.reports()[0].served_ms,
+        )
+    };
+    let it = TaskId {
+        author: 1,
+        number: 8,
+    };
+    assert_eq!(kept(100, Some(it)), (true, Some(5_000)));
+    assert_eq!(kept(40, Some(it)), (false, Some(5_000)));
+    assert_eq!(kept(100, None), (false, None));
+    let other = TaskId { number: 9, ..it };
+    assert_eq!(kept(100, Some(other)), (false, None));
+}
+
+#[test]
 fn what_came_of_each_is_told() {
     let mut story = Story::new(vec![Criterion {
         then: Then::Follow,

@@ -1,0 +1,146 @@
+//! Services on the ground (D2.7 §3.7): what they are called to, and that they are there.
+//!
+//! | event | what follows |
+//! |---|---|
+//! | an object to be followed is told | the ground station has a call for it, with the place where it was seen last |
+//! | its operator says that a task was done on the ground | it is done: who follows goes on with its own |
+//! | who asked for it hears that | told in the task's next revision, so that who begins anew knows as well |
+//! | the ground station begins another life | what its operator said to be done is said again |
+//!
+//! A ground station says so in a bundle without an offer, as a UAV says what it did: so nothing
+//! has to be settled anew about whose word it is.
+
+use super::{Known, Tasking};
+use crate::effect::{Effect, Effects};
+use crate::input::Time;
+use crate::mission::mm;
+use crate::output::TaskNews;
+use crate::wire::codec::Body;
+use crate::wire::detection::DETECTIONS_MAX;
+use crate::wire::limits::DURATION_MAX_MS;
+use crate::wire::tasks::{Bundle, DONE_MAX, DoneTask, TaskId, TaskKind, TaskState};
+use serde::{Deserialize, Serialize};
+
+/// What services on the ground are wanted for, as a ground station knows it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Call {
+    /// The task to follow it.
+    pub task: TaskId,
+    /// In which revision that was asked for.
+    pub revision: u32,
+    /// What people call the task.
+    pub name: String,
+    /// What it looks like.
+    pub looks: u8,
+    /// Where it was seen last, mm east and north of the mission's origin.
+    pub at_mm: (i32, i32),
+}
+
+impl Tasking {
+    /// What services are wanted for: objects that are to be followed.
+    pub fn calls(&self, now: Time) -> Vec<Call> {
+        let open = self.known.iter();
+        let open = open.filter(|(_, k)| k.is_open() && k.task.kind == TaskKind::Track);
+        let call = |(id, k): (&TaskId, &Known)| {
+            let mut all = self.detections.known();
+            let (_, told) = all.find(|(d, _)| d == id)?;
+            let revision = k.task.revision_as_asked();
+            let seen = self.targets.heard_at(now, (*id, revision));
+            let at_mm = seen.map_or((told.east_mm, told.north_mm), |p| (mm(p.x), mm(p.y)));
+            Some(Call {
+                task: *id,
+                revision,
+                name: k.task.name(),
+                looks: told.looks,
+                at_mm,
+            })
+        };
+        open.filter_map(call).collect()
+    }
+
+    /// Tasks of others that this peer's operator said to be done.
+    pub fn said_done(&self) -> &[DoneTask] {
+        &self.said_done
+    }
+
+    /// This peer's operator says that tasks were done on the ground. Of others' that is said in
+    /// its bundle, its own will say so themselves.
+    pub fn done_on_ground(&mut self, now: Time, tasks: &[TaskId]) -> Effects {
+        let mut effects = Effects::new();
+        for id in tasks {
+            let asked = self.known.get(id).map(|k| k.task.revision_as_asked());
+            let Some(revision) = asked else { continue };
+            effects.extend(self.note_done(now, *id, revision, self.me));
+            if id.author != self.me {
+                self.say_done(DoneTask {
+                    task: *id,
+                    revision,
+                });
+            }
+        }
+        effects.extend(self.bundle_of_done());
+        effects.push(Effect::Negotiate);
+        effects
+    }
+
+    /// What was said to be done before this process began counts.
+    pub fn was_said_done(&mut self, now: Time, done: &[DoneTask]) -> Effects {
+        for d in done {
+            self.say_done(*d);
+            self.note_done(now, d.task, d.revision, self.me);
+        }
+        self.bundle_of_done().into_iter().collect()
+    }
+
+    /// One more, ascending; of more than a bundle holds those that are over go first.
+    fn say_done(&mut self, done: DoneTask) {
+        self.said_done.retain(|d| d.task != done.task);
+        if self.said_done.len() >= DONE_MAX {
+            let is_over = |d: &DoneTask| {
+                let known = self.known.get(&d.task);
+                known.is_none_or(|k| !k.task.is_open() || k.task.revision != d.revision)
+            };
+            let over = self.said_done.iter().position(is_over);
+            self.said_done.remove(over.unwrap_or(0));
+        }
+        self.said_done.push(done);
+        self.said_done.sort_unstable();
+    }
+
+    /// The word of this peer's operator, if there is one.
+    pub(super) fn bundle_of_done(&self) -> Option<Effect> {
+        let done = self.said_done.clone();
+        (!done.is_empty()).then(|| {
+            let bundle = Bundle {
+                done,
+                ..Bundle::default()
+            };
+            Effect::Speak(0, Body::Bundle(bundle))
+        })
+    }
+
+    /// An object that this peer told of, and that is done with, is told to be so by its task.
+    pub(super) fn tell_served(&mut self, now: Time) -> Effects {
+        let own = self.known.iter().filter(|(id, k)| {
+            let is_object = id.author == self.me && id.number < DETECTIONS_MAX;
+            is_object && k.task.is_open()
+        });
+        let served = own.filter_map(|(id, k)| {
+            let (by, at) = k.done?;
+            let over_ms = u32::try_from(at.since_ms(k.since)).unwrap_or(u32::MAX);
+            let mut task = k.task.clone();
+            task.revision = task.revision.saturating_add(1);
+            (task.state, task.done_by) = (TaskState::Done, by);
+            task.over_after_ms = over_ms.min(DURATION_MAX_MS);
+            Some((*id, task))
+        });
+        let served: Vec<_> = served.collect();
+        let mut effects = Effects::new();
+        for (id, task) in served {
+            effects.push(super::report(id, &task, TaskNews::Over(TaskState::Done)));
+            self.learn(now, id, task.clone());
+            effects.push(Effect::Speak(id.number, Body::Task(task)));
+        }
+        effects
+    }
+}
