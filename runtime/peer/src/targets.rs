@@ -36,6 +36,7 @@ use skein_flight::tracking::fusion::{Board, Fused, Register};
 use skein_flight::tracking::told::Spread;
 use skein_flight::tracking::tracks::{Kind, Sighting, TargetName, Tracks};
 use skein_geometry::frame::{Point, Vector};
+use skein_geometry::math::seconds;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Density of the acceleration of targets, m²/s³: a car that brakes or turns off at 2.5 m/s²

@@ -908,8 +908,7 @@ impl Swarm {
         let Some(idx) = self.ground_station() else {
             return;
         };
-        let peer = self.peers[idx].peer.as_ref();
-        let speaks_in = peer.and_then(|p| p.speaks_in());
+        let speaks_in = self.peers[idx].voice();
         if let Some(orders) = self.operator.speaks(speaks_in) {
             self.feed(idx, Input::Command(Command::Orders(orders)));
         }
@@ -920,8 +919,7 @@ impl Swarm {
         let Some(idx) = self.ground_station() else {
             return;
         };
-        let peer = self.peers[idx].peer.as_ref();
-        let speaks_in = peer.and_then(|p| p.speaks_in());
+        let speaks_in = self.peers[idx].voice();
         for edit in self.operator.task_edits(self.now_ms, speaks_in) {
             self.feed(idx, Input::Command(Command::Task(edit)));
         }

@@ -10,12 +10,16 @@ use std::sync::Arc;
 /// So long it takes to carry an order to where no radio brings it, milliseconds.
 const COURIER_MS: u64 = 60_000;
 
+/// In which life a ground station speaks, and the how-manieth run of its process that is: without
+/// its disk, and where nobody remembers it, it counts its lives anew.
+pub(super) type Voice = (u32, Incarnation);
+
 /// What the operator wants, and what the ground station said of it.
 #[derive(Debug)]
 pub(super) struct Operator {
     mission: Arc<Mission>,
     /// The standing orders, and in which life the ground station spoke them.
-    orders: Option<(Orders, Option<Incarnation>)>,
+    orders: Option<(Orders, Option<Voice>)>,
     /// The record in which it spoke last.
     spoken: Vec<u8>,
     /// What was not said of tasks yet.
@@ -24,7 +28,7 @@ pub(super) struct Operator {
     /// and in which life it was told of it.
     tasks: OperatorsTasks,
     tasks_at_ms: u64,
-    tasks_in: Option<Incarnation>,
+    tasks_in: Option<Voice>,
     /// Since when somebody waits who cannot be told to go on, milliseconds.
     stranded_ms: Option<u64>,
 }
@@ -89,12 +93,12 @@ impl Operator {
 
     /// What the ground station is to be told of tasks in the life in which it speaks: those of
     /// an earlier one once, and what is new.
-    pub(super) fn task_edits(&mut self, now_ms: u64, life: Option<Incarnation>) -> Vec<TaskEdit> {
-        if life.is_none() {
+    pub(super) fn task_edits(&mut self, now_ms: u64, voice: Option<Voice>) -> Vec<TaskEdit> {
+        if voice.is_none() {
             return Vec::new();
         }
-        let anew = self.tasks_in != life && !self.tasks.is_empty();
-        self.tasks_in = life;
+        let anew = self.tasks_in != voice && !self.tasks.is_empty();
+        self.tasks_in = voice;
         let again = anew.then(|| {
             let older = |t: &AskedTask| AskedTask {
                 age_ms: t.age_ms + now_ms.saturating_sub(self.tasks_at_ms),
@@ -121,11 +125,11 @@ impl Operator {
     }
 
     /// The orders that the ground station is to say in the life in which it speaks, once.
-    pub(super) fn speaks(&mut self, life: Option<Incarnation>) -> Option<Orders> {
+    pub(super) fn speaks(&mut self, voice: Option<Voice>) -> Option<Orders> {
         let (orders, said_in) = self.orders.as_mut()?;
-        let news = life.is_some() && *said_in != life;
+        let news = voice.is_some() && *said_in != voice;
         news.then(|| {
-            *said_in = life;
+            *said_in = voice;
             orders.clone()
         })
     }
@@ -159,12 +163,14 @@ mod tests {
     #[test]
     fn an_order_is_said_once_in_each_life_and_carried_to_who_waits_out_of_reach_for_a_minute() {
         let mut operator = Operator::new(fixture::square(1).mission);
-        assert_eq!(operator.speaks(Some(1)), None);
+        assert_eq!(operator.speaks(Some((1, 1))), None);
         operator.order(None, Order::Hold);
         assert_eq!(operator.speaks(None), None);
-        assert_eq!(operator.speaks(Some(1)), Some(Order::Hold.into()));
-        assert_eq!(operator.speaks(Some(1)), None);
-        assert_eq!(operator.speaks(Some(2)), Some(Order::Hold.into()));
+        assert_eq!(operator.speaks(Some((1, 1))), Some(Order::Hold.into()));
+        assert_eq!(operator.speaks(Some((1, 1))), None);
+        assert_eq!(operator.speaks(Some((1, 2))), Some(Order::Hold.into()));
+        // Without its disk it is in that life once more.
+        assert_eq!(operator.speaks(Some((2, 2))), Some(Order::Hold.into()));
         operator.was_spoken(&[7]);
         assert_eq!(operator.courier(0, false), None);
         assert_eq!(operator.courier(COURIER_MS, false), None, "nobody goes on");
@@ -172,7 +178,7 @@ mod tests {
         assert!(operator.wants_to_fly(2) && !operator.wants_to_fly(1));
         operator.order(None, Order::Resume);
         assert_eq!(operator.courier(COURIER_MS, true), None, "nobody said it");
-        operator.speaks(Some(2));
+        operator.speaks(Some((2, 2)));
         assert_eq!(operator.courier(10, true), None);
         assert_eq!(operator.courier(20, false), None);
         assert_eq!(operator.courier(30, true), None);

@@ -1,6 +1,7 @@
 //! One peer of a swarm as its driver sees it: process, clock, disk, inbox.
 
 use super::air::Air;
+use super::operator::Voice;
 use super::stream::{Concern, Stream};
 use crate::check::PeerSnapshot;
 use crate::disk::Disk;
@@ -247,6 +248,13 @@ impl SimPeer {
     #[must_use]
     pub fn has_voice(&self) -> bool {
         self.process == Process::Running && !self.silent && !self.is_lifeless
+    }
+
+    /// In which life it speaks, and in which run of its process; none where it does not.
+    #[must_use]
+    pub fn voice(&self) -> Option<Voice> {
+        let life = self.peer.as_ref()?.speaks_in()?;
+        Some((self.boots, life))
     }
 
     /// What it believes and where it is, while it runs.

@@ -141,11 +141,12 @@ fn what_is_of_another_time_or_no_covariance_is_left_out() {
         ..told
     };
     two.hear(Time(0), 1, &ahead);
-    two.hear(2, &told);
+    two.hear(Time(0), 2, &told);
     assert_eq!(two.known(TASK), None);
     for (author, number) in (3..200).zip(0..) {
-        two.hear(author, &Target { number, ..told });
+        two.hear(Time(0), author, &Target { number, ..told });
         two.hear(
+            Time(0),
             author,
             &Target {
                 task: 1 + number as u16,
