@@ -166,6 +166,7 @@ impl Standing {
 mod tests {
     use super::*;
     use crate::testing::mission;
+    use skein_peer::wire::tasks::TaskId;
 
     #[test]
     fn what_was_said_last_stands_until_another_mission_is_configured() {
@@ -182,7 +183,17 @@ mod tests {
         standing.keep_orders(Order::Hold.into()).unwrap();
         standing.keep_mission(Arc::clone(&revised)).unwrap();
         standing.keep_orders(Order::ReturnToBase.into()).unwrap();
+        let task = TaskId {
+            author: 3,
+            number: 1,
+        };
+        let said = OperatorsTasks {
+            asked: Vec::new(),
+            done: vec![DoneTask { task, revision: 2 }],
+        };
+        standing.keep_tasks(said.clone()).unwrap();
         let again = open(&configured);
+        assert_eq!(again.tasks(), said);
         assert_eq!(again.orders(), Some(Order::ReturnToBase.into()));
         assert_eq!(again.mission(), Some(revised));
         let other = Mission {
@@ -191,6 +202,7 @@ mod tests {
         };
         let anew = open(&other);
         assert_eq!((anew.orders(), anew.mission()), (None, None));
+        assert!(anew.tasks().is_empty());
     }
 
     #[test]

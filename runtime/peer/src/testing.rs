@@ -486,13 +486,10 @@ impl Harness {
         );
     }
 
-    /// What the operator of a ground station said of tasks.
-    ///
-    /// # Panics
-    /// Where no process runs.
+    /// What the operator of a ground station said of tasks; nothing where no process runs.
     #[must_use]
     pub fn operators_tasks(&self, id: u16) -> OperatorsTasks {
-        self.peer(id).unwrap().operators_tasks()
+        self.peer(id).map(Peer::operators_tasks).unwrap_or_default()
     }
 
     /// Whether a peer speaks.
