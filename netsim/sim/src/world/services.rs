@@ -5,7 +5,7 @@
 //! |---|---|
 //! | the ground station has a call, and a unit is free | the nearest goes there, along its streets where it has some |
 //! | what is called for was seen elsewhere | the unit drives there instead |
-//! | a vehicle that looks so is within [`REACHED_M`] of it | it is served: it stops, and the unit stays with it for a while |
+//! | it is within [`REACHED_M`] of the vehicle that looks so and is nearest to where it is called | that is served: it stops, and the unit stays with it for a while |
 //! | the call is over | the unit is free, and waits where it is |
 //!
 //! # Guarantees
@@ -27,6 +27,9 @@ const STEP_MS: u64 = 250;
 
 /// A unit has reached what is so near, metres: along a street and across it.
 pub const REACHED_M: f64 = 20.0;
+
+/// It is the one that is called for if it is no farther from where that is said to be, metres.
+const MEANT_M: f64 = 40.0;
 
 /// A way is planned anew where its end is farther than this from what is called for, metres.
 const ELSEWHERE_M: f64 = 4.0;
@@ -166,7 +169,7 @@ impl Services {
             (unit.end, unit.way) = (to, spec.way(unit.at, to));
         }
         unit.drive(spec.speed_mps * seconds(STEP_MS));
-        if vehicles.stop_near(unit.at, REACHED_M, looks) {
+        if vehicles.stop_near((to, MEANT_M), (unit.at, REACHED_M), looks) {
             unit.busy_ms = self.moved_ms + STAYS_MS;
             unit.goes_to = None;
             unit.way.clear();
@@ -290,6 +293,12 @@ mod tests {
         assert_eq!(served_ms(&mut world, |_| Point::new(200.0, 80.0)), None);
         let at = world.services().places().next().unwrap();
         assert!((at - Point::new(200.0, 80.0)).norm() < 1.0, "{at}");
+        // Nor what it drives past on its way, though it may be taken for what is called for.
+        let mut world = scene(vec![unit(Point::new(200.0, 0.0), None)]);
+        assert_eq!(served_ms(&mut world, |_| Point::new(200.0, 600.0)), None);
+        let car = world.vehicles().places().next().unwrap();
+        world.advance(400_000);
+        assert_ne!(world.vehicles().places().next().unwrap(), car);
         // Nor what looks otherwise.
         let mut world = scene(vec![unit(Point::new(200.0, 280.0), None)]);
         let bus = Call {

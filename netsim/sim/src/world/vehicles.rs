@@ -100,15 +100,21 @@ impl Vehicles {
         }
     }
 
-    /// Stops the nearest within so many metres of a place that looks so, or may be taken to, if
-    /// there is one.
-    pub(super) fn stop_near(&mut self, place: Point, within_m: f64, looks: u8) -> bool {
+    /// Stops what looks so, or may be taken to, and is nearest to a place, within so many metres
+    /// of it, if it is also near to another place; says whether it is.
+    pub(super) fn stop_near(
+        &mut self,
+        (place, within_m): (Point, f64),
+        (other, near_m): (Point, f64),
+        looks: u8,
+    ) -> bool {
         let all = self.all.iter_mut().zip(self.specs.iter());
         let may_be = all.filter(|(_, s)| s.kind == looks || s.confused_permille > 0);
         let off = may_be.map(|(v, _)| ((v.at - place).norm(), v));
-        let near = off.filter(|(m, _)| *m <= within_m);
-        let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
-        nearest.map(|(_, v)| v.stop()).is_some()
+        let there = off.filter(|(m, _)| *m <= within_m);
+        let nearest = there.min_by(|a, b| a.0.total_cmp(&b.0));
+        let reached = nearest.filter(|(_, v)| (v.at - other).norm() <= near_m);
+        reached.map(|(_, v)| v.stop()).is_some()
     }
 
     /// Whether one of them is in the picture of a UAV, and nothing stands in between.
