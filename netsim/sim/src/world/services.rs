@@ -294,8 +294,12 @@ mod tests {
         let at = world.services().places().next().unwrap();
         assert!((at - Point::new(200.0, 80.0)).norm() < 1.0, "{at}");
         // Nor what it drives past on its way, though it may be taken for what is called for.
-        let mut world = scene(vec![unit(Point::new(200.0, 0.0), None)]);
-        assert_eq!(served_ms(&mut world, |_| Point::new(200.0, 600.0)), None);
+        let slow = ServiceSpec {
+            speed_mps: 0.5,
+            ..unit(Point::new(230.0, 300.0), None)
+        };
+        let mut world = scene(vec![slow]);
+        assert_eq!(served_ms(&mut world, |_| Point::new(230.0, 600.0)), None);
         let car = world.vehicles().places().next().unwrap();
         world.advance(400_000);
         assert_ne!(world.vehicles().places().next().unwrap(), car);
