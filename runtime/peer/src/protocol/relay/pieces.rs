@@ -98,11 +98,18 @@ impl Relay {
     /// missions one of that which was on the air longest ago.
     pub(super) fn first_piece(&self, now: Time) -> Option<RecordKey> {
         let waiting = || self.queue.ripe_pieces(now);
+        let turn = |key: &RecordKey| (self.held.get(key).map(super::Held::turn), *key);
         let first = mission_key(&waiting().next()?);
-        let alone = waiting().all(|key| mission_key(&key) == first);
-        let goes_on = (!alone).then(|| self.longest_unsaid(waiting()));
-        let waiting = waiting().filter(|key| goes_on.is_none_or(|m| m == Some(mission_key(key))));
-        waiting.min_by_key(|key| (self.held.get(key).map(super::Held::turn), *key))
+        let mut alone = true;
+        // As a rule they are all of one mission, and one look is enough.
+        let all = waiting().inspect(|key| alone &= mission_key(key) == first);
+        let of_all = all.min_by_key(turn);
+        if alone {
+            return of_all;
+        }
+        let goes_on = self.longest_unsaid(waiting());
+        let of_one = waiting().filter(|key| goes_on == Some(mission_key(key)));
+        of_one.min_by_key(turn)
     }
 
     /// Of which mission among these no piece was on the air for longest.
