@@ -13,7 +13,7 @@
 //! | held in a newer version, or of an earlier life and no piece of a mission | it is heard | nothing |
 //! | any of an author but pieces of missions | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
-//! | pieces of a mission | pieces of a newer one of its author come | held until that one is whole and followed; said again once no more of it come ([`pieces`]) |
+//! | pieces of a mission | pieces of a newer one of its author come | held until that one is whole and followed; said again once no more of it come (the module `pieces`) |
 //! | a piece of a mission | a neighbour lacks it: its beacon, the last ten intervals considered, shows an older revision, and it says no pieces of that mission or this one; else it only is held | passed on, or sent again as to who lacks it |
 //! | a piece of a mission | it is due | of all that wait goes first what was never on the air, then what most lack, what nobody passed on, what was on the air longest ago |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
