@@ -13,6 +13,7 @@
 //! | held in a newer version, or of an earlier life and no piece of a mission | it is heard | nothing |
 //! | any of an author but pieces of missions | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
+//! | pieces of a mission | pieces of a newer one of its author come | held until that one is whole and followed; said again once no more of it come (the module `pieces`) |
 //! | a piece of a mission | a neighbour lacks it: its beacon, the last ten intervals considered, shows an older revision, and it says no pieces of that mission or this one; else it only is held | passed on, or sent again as to who lacks it |
 //! | a piece of a mission | it is due | of all that wait goes first what was never on the air, then what most lack, what nobody passed on, what was on the air longest ago |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
@@ -36,12 +37,13 @@ use crate::wire::codec::{self, Body};
 use crate::wire::key;
 use crate::wire::kinds::Kind;
 use crate::wire::limits::{CHUNKS_MAX, HOPS_MAX, PEERS_MAX};
-use crate::wire::message::{Beacon, Gossip, Lacking, Record};
+use crate::wire::message::{Beacon, Gossip, Lacking, MissionChunk, Record};
 use core::cmp::Reverse;
 use skein_geometry::hash::Fnv;
 mod digest;
 #[cfg(test)]
 mod many_relays;
+mod pieces;
 mod queue;
 mod wants;
 
@@ -51,8 +53,8 @@ use std::collections::BTreeMap;
 use wants::{Mission, Wants};
 
 /// Most records held: 256 peers with a state, a bid, a claim, an order, a finish and
-/// four events each, and one mission of 256 pieces.
-pub const MAX_RECORDS: usize = PEERS_MAX * 9 + CHUNKS_MAX as usize;
+/// four events each, and two missions of 256 pieces, the one that is followed and a newer one.
+pub const MAX_RECORDS: usize = PEERS_MAX * 9 + 2 * CHUNKS_MAX as usize;
 
 /// A record is not passed on if so many copies of it were heard first: one is not enough
 /// where three in ten are lost. Copies count, not neighbours: of two from one neighbour
@@ -119,11 +121,14 @@ pub struct Out {
     pub lifetime_ms: u32,
 }
 
-/// Author, kind, subject: an author's records lie together.
-type RecordKey = (u16, u8, u16);
+/// Author, kind, subject, and of a piece of a mission its revision, else 0: an author's records
+/// lie together.
+type RecordKey = (u16, u8, u16, u32);
 
-fn key_of(record: &Record) -> RecordKey {
-    (record.author, record.kind, record.subject)
+/// The key of a record that says so much of a mission, if it is a piece of one.
+fn key_of(record: &Record, piece: Option<&MissionChunk>) -> RecordKey {
+    let revision = piece.map_or(0, |piece| piece.revision);
+    (record.author, record.kind, record.subject, revision)
 }
 
 /// Whether a record is part of what a beacon tells of its author's records.
@@ -131,16 +136,22 @@ fn is_counted(kind: Kind) -> bool {
     kind.relayed() && !matches!(kind, Kind::Mission | Kind::Trail | Kind::Crowd)
 }
 
-/// Of which mission a record is a piece.
-fn mission_of(kind: Kind, record: &Record) -> Option<Mission> {
+/// What a record says of the mission of which it is a piece.
+fn piece_of(kind: Kind, record: &Record) -> Option<MissionChunk> {
     // Most records are none: only a piece is decoded a second time.
     if kind != Kind::Mission {
         return None;
     }
     match codec::decode_body(kind, &record.body) {
-        Ok(Body::Mission(piece)) => Some((piece.revision, piece.content_hash)),
+        Ok(Body::Mission(piece)) => Some(piece),
         _ => None,
     }
+}
+
+/// The mission, and how many pieces it has; none and 0 of what is no piece.
+fn mission_of(piece: Option<&MissionChunk>) -> (Option<Mission>, u16) {
+    let mission = piece.map(|piece| (piece.revision, piece.content_hash));
+    (mission, piece.map_or(0, |piece| piece.chunks))
 }
 
 fn is_piece(key: &RecordKey) -> bool {
@@ -149,7 +160,7 @@ fn is_piece(key: &RecordKey) -> bool {
 
 /// All keys of one author.
 fn keys_of(author: u16) -> core::ops::RangeInclusive<RecordKey> {
-    (author, 0, 0)..=(author, u8::MAX, u16::MAX)
+    (author, 0, 0, 0)..=(author, u8::MAX, u16::MAX, u32::MAX)
 }
 
 #[derive(Clone, Debug)]
@@ -164,6 +175,10 @@ struct Held {
     repeats: u8,
     /// Of which mission it is a piece.
     mission: Option<Mission>,
+    /// How many pieces that mission has.
+    pieces: u16,
+    /// When this version came.
+    came: Time,
     /// How many neighbours told since it was last on the air that they lack this piece.
     lack: usize,
     /// When somebody, this peer included, was last heard sending this version.
@@ -229,10 +244,12 @@ impl Relay {
 
     /// A record of this peer's own: held, and queued at once.
     pub fn own(&mut self, now: Time, record: &Record, bytes: Vec<u8>) {
-        let key = key_of(record);
         let Some(kind) = Kind::of_number(record.kind) else {
             return;
         };
+        let piece = piece_of(kind, record);
+        let key = key_of(record, piece.as_ref());
+        let (mission, pieces) = mission_of(piece.as_ref());
         let vital = kind.priority() <= Priority::Claim;
         self.hold(
             key,
@@ -243,12 +260,14 @@ impl Relay {
                 copies: 0,
                 is_passed_on: false,
                 repeats: if vital { REPEATS } else { 0 },
-                mission: mission_of(kind, record),
+                mission,
+                pieces,
+                came: now,
                 lack: 0,
                 sent: now,
             },
         );
-        if !self.is_wanted(now, &key) {
+        if !self.held.contains_key(&key) || !self.is_wanted(now, &key) {
             return;
         }
         let delay = if kind == Kind::Bid {
@@ -261,11 +280,12 @@ impl Relay {
 
     /// A record of somebody else's that was heard.
     pub fn offer(&mut self, now: Time, record: &Record, bytes: &[u8], hops: u8) -> Offer {
-        let key = key_of(record);
         let version = (record.incarnation, record.seq);
         let Some(kind) = Kind::of_number(record.kind) else {
             return Offer::Stale;
         };
+        let piece = piece_of(kind, record);
+        let key = key_of(record, piece.as_ref());
         if let Some(h) = self.held.get_mut(&key) {
             let known = (h.record.incarnation, h.record.seq);
             if version < known {
@@ -284,7 +304,7 @@ impl Relay {
                 return Offer::Duplicate;
             }
         }
-        let mission = mission_of(kind, record);
+        let (mission, pieces) = mission_of(piece.as_ref());
         if mission.is_none() && self.newest_life(record.author) > record.incarnation {
             return Offer::Stale;
         }
@@ -298,10 +318,15 @@ impl Relay {
             is_passed_on: false,
             repeats: 0,
             mission,
+            pieces,
+            came: now,
             lack: 0,
             sent: now,
         };
         self.hold(key, held);
+        if !self.held.contains_key(&key) {
+            return Offer::Stale;
+        }
         if kind.relayed() && hops < HOPS_MAX && self.is_wanted(now, &key) {
             let delay =
                 RELAY_DELAY_MS + self.jitter(&key, version) % self.spread_ms(RELAY_SPREAD_MS);
@@ -312,7 +337,8 @@ impl Relay {
 
     /// This peer's own record is heard: a neighbour passes it on, so it was received.
     pub fn echo(&mut self, record: &Record) {
-        let key = key_of(record);
+        let piece = Kind::of_number(record.kind).and_then(|kind| piece_of(kind, record));
+        let key = key_of(record, piece.as_ref());
         let version = (record.incarnation, record.seq);
         if let Some(held) = self.held.get_mut(&key)
             && (held.record.incarnation, held.record.seq) == version
@@ -325,8 +351,15 @@ impl Relay {
         }
     }
 
-    /// Whether some neighbour may need a record: a piece of a mission only if it lacks it.
+    /// Whether some neighbour may need a record: a piece of a mission only if it lacks it and no
+    /// newer one comes.
     fn is_wanted(&self, now: Time, key: &RecordKey) -> bool {
+        let comes = is_piece(key) && key.3 < self.coming(now, key.0);
+        !comes && self.is_lacking(now, key)
+    }
+
+    /// Whether some neighbour lacks a piece of a mission; all else may be lacking.
+    fn is_lacking(&self, now: Time, key: &RecordKey) -> bool {
         let mission = self.held.get(key).and_then(|h| h.mission);
         mission.is_none_or(|mission| self.wants.is_wanted(now, mission, key.2))
     }
@@ -435,15 +468,13 @@ impl Relay {
                 self.queue.remove(&k);
             }
         }
-        if let Some((revision, _)) = held.mission {
-            self.newest_piece = self.newest_piece.max(revision);
-            // A mission of fewer pieces leaves the last ones of the one before, which complete
-            // nothing.
-            self.forget(key.0, |held| {
-                held.mission.is_some_and(|piece| piece.0 < revision)
-            });
-        }
+        let mission = held.mission;
         self.held.insert(key, held);
+        if let Some((revision, _)) = mission {
+            self.newest_piece = self.newest_piece.max(revision);
+            self.outdate(key.0, revision);
+            self.keep_missions(key.0);
+        }
         assert!(self.held.len() <= MAX_RECORDS, "records keep to their cap");
     }
 
@@ -471,7 +502,7 @@ impl Relay {
     /// Whether a record of this peer's own waits to be sent.
     #[must_use]
     pub fn waits(&self, kind: Kind) -> bool {
-        self.queue.contains(&(self.me, kind.number(), 0))
+        self.queue.contains(&(self.me, kind.number(), 0, 0))
     }
 
     /// How long a record of this kind is worth sending, milliseconds.
@@ -513,12 +544,18 @@ impl Relay {
     /// Takes out the pieces that nobody lacks any more, and queues those that somebody lacks,
     /// `wanted` by the one that was heard.
     fn queue_pieces(&mut self, now: Time, wanted: bool) {
-        for key in self.queue.pieces() {
-            if !self.is_wanted(now, &key) {
+        self.borrow(now);
+        let waiting = self.queue.pieces();
+        if waiting.is_empty() && !wanted {
+            return;
+        }
+        let coming = self.all_coming(now);
+        for key in waiting {
+            let newest = coming.get(&key.0).copied().unwrap_or(0);
+            if key.3 < newest || !self.is_lacking(now, &key) {
                 self.queue.remove(&key);
             }
         }
-        self.borrow(now);
         if !wanted {
             return;
         }
@@ -526,7 +563,8 @@ impl Relay {
         let on_the_way_ms = self.air.interval_ms() / ON_THE_WAY;
         let mut lacking: Vec<(Turn, RecordKey)> = Vec::new();
         for (key, held) in &mut self.held {
-            let Some(mission) = held.mission else {
+            let newest = coming.get(&key.0).copied().unwrap_or(0);
+            let Some(mission) = held.mission.filter(|m| m.0 >= newest) else {
                 continue;
             };
             let said = (held.copies > 0).then(|| held.sent.plus_ms(on_the_way_ms));
@@ -541,15 +579,11 @@ impl Relay {
         }
     }
 
-    /// Of the pieces that have waited for their random time the one that goes first.
-    fn first_piece(&self, now: Time) -> Option<RecordKey> {
-        let waiting = self.queue.ripe_pieces(now);
-        waiting.min_by_key(|key| (self.held.get(key).map(Held::turn), *key))
-    }
-
     /// This peer's beacon shows this revision.
     pub fn follow(&mut self, now: Time, revision: u32) {
-        self.follows = revision;
+        if core::mem::replace(&mut self.follows, revision) != revision {
+            self.keep_all_missions();
+        }
         self.borrow(now);
     }
 

@@ -276,17 +276,22 @@ fn a_lap_begins_three_periods_after_the_last_cell_of_the_one_before() {
     assert_eq!(covered(&h, 1), 0);
 }
 
+/// A mission of many pieces: so many zones are far beside it.
+fn in_pieces(revision: u32, cols: i32, zones: i32) -> Mission {
+    let mut large = mission(revision, cols, 4);
+    large.zones = (0..zones)
+        .map(|i| 1_000_000 + 20_000 * i)
+        .map(|x| vec![(x, 900_000), (x + 9_000, 900_000), (x, 909_000)])
+        .collect();
+    large
+}
+
 /// Two hold halves of a mission whose author is gone: each says what the other lacks, once.
 #[test]
 fn halves_of_a_mission_are_brought_together_after_its_author_is_gone() {
     let mut h = Harness::started(2, mission(1, 6, 4));
     h.run_s(10);
-    let mut large = mission(2, 8, 4);
-    large.zones = (0..120)
-        .map(|i| 1_000_000 + 20_000 * i)
-        .map(|x| vec![(x, 900_000), (x + 9_000, 900_000), (x, 909_000)])
-        .collect();
-    let pieces = chunks(&large).unwrap();
+    let pieces = chunks(&in_pieces(2, 8, 120)).unwrap();
     let n = pieces.len();
     assert!(n > 10, "{n}");
     for id in [1, 2] {
@@ -309,4 +314,50 @@ fn halves_of_a_mission_are_brought_together_after_its_author_is_gone() {
     let lacking = h.count_said(1, Kind::Lacking);
     h.run_s(10);
     assert_eq!(h.count_said(1, Kind::Lacking), lacking, "nobody lacks any");
+}
+
+/// The pieces of a mission, as their author says them from a number on.
+fn pieces_of(mission: &Mission, author: u16, first_seq: u32) -> Vec<Vec<u8>> {
+    let pieces = (0u16..).zip(chunks(mission).unwrap());
+    let said = |(i, piece)| {
+        let seq = first_seq + u32::from(i);
+        record(author, 1, seq, i, &Body::Mission(piece))
+    };
+    pieces.map(said).collect()
+}
+
+/// The author says one piece of a newer mission to one of three and is gone. Who holds the
+/// former mission whole lends it to who has begun anew, also beyond its own earshot.
+#[test]
+fn a_piece_of_a_newer_mission_takes_the_former_one_from_nobody() {
+    const AUTHOR: u16 = 9;
+    let mut h = Harness::started(3, mission(1, 6, 4));
+    for (a, b) in [(1, 3), (3, 1)] {
+        h.link(a, b).cut = true;
+    }
+    h.run_s(10);
+    for id in [2, 3] {
+        h.stop(id);
+    }
+    let former = pieces_of(&in_pieces(2, 8, 40), AUTHOR, 1);
+    let newer = pieces_of(&in_pieces(3, 10, 40), AUTHOR, 100);
+    assert!(former.len() > 1 && newer.len() > 1);
+    for said in former {
+        h.inject(1, said);
+    }
+    assert!(h.run_until(5, |h| h.beliefs(1).revision == 2));
+    h.run_s(5);
+    h.inject(1, newer[0].clone());
+    h.run_s(5);
+    for id in [2, 3] {
+        h.start(id);
+    }
+    let all =
+        |revision: u32| move |h: &Harness| (1..=3).all(|id| h.beliefs(id).revision == revision);
+    assert!(h.run_until(120, all(2)), "the author is gone");
+    // It is met again: the newer mission goes on from the piece that is known.
+    for said in newer.iter().skip(1) {
+        h.inject(3, said.clone());
+    }
+    assert!(h.run_until(120, all(3)), "the author is back");
 }

@@ -208,7 +208,7 @@ mod tests {
         let (mut kept, mut full) = (0, 0);
         for now in (0..60_000).map(|step| Time(step * 7)) {
             let kind = [Kind::Claim, Kind::Cover, Kind::Mission][below(3) as usize];
-            let key = (below(20) as u16, kind.number(), below(4) as u16);
+            let key = (below(20) as u16, kind.number(), below(4) as u16, 0);
             let from = now.plus_ms(below(2_000));
             let waiting = Waiting {
                 from,

@@ -200,35 +200,111 @@ fn a_piece_that_nobody_passes_on_is_sent_most_often() {
     assert!(times[7] > 3 * most && most > 1, "{times:?}");
 }
 
+/// A piece of one of several missions of four pieces; its byte is ten times the revision and
+/// its number.
+fn hear_piece_of(r: &mut Relay, now_ms: u64, (revision, subject): (u8, u8)) -> Offer {
+    let chunk = MissionChunk {
+        revision: u32::from(revision),
+        content_hash: 6,
+        chunks: 4,
+        bytes: vec![0; 20],
+    };
+    let record = Record {
+        seq: u32::from(revision) * 10 + u32::from(subject),
+        body: codec::encode_body(&Body::Mission(chunk)),
+        ..piece(u16::from(subject), 4)
+    };
+    let byte = revision.wrapping_mul(10).wrapping_add(subject);
+    r.offer(Time(now_ms), &record, &[byte; 40], 0)
+}
+
+/// Which revisions' pieces are held, and of each how many.
+fn held_of(r: &Relay) -> BTreeMap<u32, usize> {
+    let mut held = BTreeMap::new();
+    for key in r.held.keys() {
+        *held.entry(key.3).or_default() += 1;
+    }
+    held
+}
+
 #[test]
-fn what_a_longer_mission_leaves_is_not_sent_any_more() {
+fn what_a_longer_mission_leaves_is_not_sent_while_a_newer_one_comes() {
     let mut r = relay(2);
-    let of = |revision, subject| {
-        let mut record = piece(subject, 4);
-        let chunk = MissionChunk {
-            revision,
-            content_hash: 6,
-            chunks: 4,
-            bytes: vec![0; 20],
-        };
-        record.seq = revision * 10 + u32::from(subject);
-        record.body = codec::encode_body(&Body::Mission(chunk));
-        record
-    };
-    let lacks = Beacon {
-        revision: 1,
-        gossip: Vec::new(),
-        ..samples::beacon(1)
-    };
-    r.on_beacon(Time(4_000), 7, &lacks);
-    for (revision, subject) in [(2, 0), (2, 1), (2, 2), (2, 3), (3, 0), (3, 1)] {
-        let bytes = [10 * revision as u8 + subject as u8; 40];
-        r.offer(Time(5_000), &of(revision, subject), &bytes, 0);
+    r.follow(Time(4_000), 2);
+    r.on_beacon(Time(4_000), 7, &beacon_of(1, 2));
+    for piece in [(2, 0), (2, 1), (2, 2), (2, 3), (3, 0), (3, 1)] {
+        assert_eq!(hear_piece_of(&mut r, 5_000, piece), Offer::New);
     }
     let said = (5_000..200_000).filter_map(|t| r.poll(Time(t)).map(|out| out.bytes[0]));
     let said: std::collections::BTreeSet<u8> = said.collect();
     assert_eq!(said.into_iter().collect::<Vec<u8>>(), [30, 31]);
-    assert_eq!(r.records().len(), 2);
+    assert_eq!(held_of(&r), [(2, 4), (3, 2)].into());
+    // Once all of the newer one is here and flown, nothing of the older one is held.
+    for piece in [(3, 2), (3, 3)] {
+        assert_eq!(hear_piece_of(&mut r, 200_000, piece), Offer::New);
+    }
+    assert_eq!(held_of(&r), [(2, 4), (3, 4)].into());
+    r.follow(Time(200_000), 3);
+    assert_eq!(held_of(&r), [(3, 4)].into());
+    assert_eq!(hear_piece_of(&mut r, 201_000, (2, 0)), Offer::Stale);
+}
+
+#[test]
+fn the_former_mission_is_said_once_the_newer_one_comes_no_more() {
+    let mut r = relay(2);
+    r.follow(Time(4_000), 2);
+    for subject in 0..4 {
+        // Others passed them on; of the newer one nobody but this peer has a piece.
+        assert_eq!(hear_piece_of(&mut r, 5_000, (2, subject)), Offer::New);
+        assert_eq!(hear_piece_of(&mut r, 5_001, (2, subject)), Offer::Duplicate);
+    }
+    for subject in 0..2 {
+        assert_eq!(hear_piece_of(&mut r, 10_000, (3, subject)), Offer::New);
+    }
+    let mut said: Vec<(u64, u8)> = Vec::new();
+    for t in 10_000..120_000 {
+        // It hears nothing, and goes on lacking all.
+        if t % 1_000 == 0 {
+            r.on_beacon(Time(t), 7, &beacon_of(1, 2));
+        }
+        said.extend(r.poll(Time(t)).map(|out| (t, out.bytes[0])));
+    }
+    let first = |byte: u8| said.iter().find(|(_, b)| *b == byte).map(|(t, _)| *t);
+    let count = |byte: u8| said.iter().filter(|(_, b)| *b == byte).count();
+    assert!(first(30).is_some_and(|t| t < 22_000), "{said:?}");
+    assert!(first(31).is_some_and(|t| t < 22_000), "{said:?}");
+    // Twelve intervals after its last piece.
+    for byte in 20..24 {
+        let from = first(byte).unwrap();
+        assert!((22_000..60_000).contains(&from), "{said:?}");
+        assert!(count(byte) >= 3, "{said:?}");
+    }
+    assert!(count(30) >= 6 && count(31) >= 6, "{said:?}");
+    // It goes on coming: the former one waits again.
+    assert_eq!(hear_piece_of(&mut r, 120_000, (3, 2)), Offer::New);
+    let later = (120_000..130_000).filter_map(|t| r.poll(Time(t)).map(|out| out.bytes[0]));
+    assert!(later.into_iter().all(|byte| byte >= 30));
+}
+
+/// Made-up revisions and those of long ago, in any order.
+#[test]
+fn of_an_author_the_mission_that_is_followed_is_held_and_few_beside_it() {
+    let mut r = relay(2);
+    r.follow(Time(4_000), 9);
+    for subject in 0..4 {
+        assert_eq!(hear_piece_of(&mut r, 5_000, (9, subject)), Offer::New);
+    }
+    let most = 4 + 4 * crate::mission::MAX_PARTIAL;
+    for step in 0..2_000_u64 {
+        let [revision, subject, ..] = (step * 7919).to_le_bytes();
+        hear_piece_of(&mut r, 6_000 + step, (revision.max(1), subject % 4));
+        let held = held_of(&r);
+        assert!(held.values().sum::<usize>() <= most, "{held:?}");
+        assert_eq!(held.first_key_value(), Some((&9, &4)));
+    }
+    assert_eq!(hear_piece_of(&mut r, 9_000, (8, 0)), Offer::Stale);
+    let held: Vec<u32> = held_of(&r).into_keys().collect();
+    assert_eq!(held, [9, 252, 253, 254, 255]);
 }
 
 #[test]
