@@ -185,6 +185,12 @@ fn settings(args: &TrackingArgs) -> anyhow::Result<Settings> {
         stand_off_m: args.stand_off_m,
         optics,
         noise: args.noise.then(Noise::usual),
+        knows: Knows {
+            buildings: !args.blind,
+            searches: !args.glances,
+            streets: !args.no_map,
+            targets: args.told,
+        },
         kill: args.uavs > 1,
         lasts_s: f64::from(args.seconds),
     })

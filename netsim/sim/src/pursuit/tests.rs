@@ -21,6 +21,7 @@ fn settings() -> Settings {
         stand_off_m: 150.0,
         optics: Optics::gimballed(),
         noise: None,
+        knows: Knows::default(),
         kill: false,
         lasts_s: 240.0,
     }

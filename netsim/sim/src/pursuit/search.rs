@@ -1,0 +1,284 @@
+//! What a UAV does about a target that it lost (D2.7 §3.7): where it was seen last, where it may
+//! be by now, where the camera looks for it and where the UAV flies.
+//!
+//! | event | what follows |
+//! |---|---|
+//! | a target is seen | it is remembered where, and how it moved |
+//! | a target is not seen for a second | chances begin where it was seen last: on the streets, or over the ground where none are known |
+//! | a look | chances go on; what all cameras showed, and no building hid, is less likely |
+//! | nothing is told of it any more | it is lost, and wanted all the same |
+//! | another one turns up that was first seen since, near enough | that is it |
+
+use super::Town;
+use super::camera::Camera;
+use skein_flight::tracking::chance::ChanceMap;
+use skein_flight::tracking::follower::TargetMotion;
+use skein_flight::tracking::fusion::Fused;
+use skein_flight::tracking::handover::Wanted;
+use skein_flight::tracking::lookout::{Looker, fly_to, point_at};
+use skein_flight::tracking::streets::{LastSeen, StreetChances, Streets};
+use skein_flight::tracking::tracks::TargetName;
+use skein_geometry::frame::{Point, Vector};
+use skein_geometry::math::seconds;
+use std::collections::BTreeMap;
+
+/// What a look leaves of the chance that it is there after all: nine of ten are recognised, but
+/// looks that follow each other are alike.
+const LEFT: f64 = 0.5;
+
+/// A camera is pointed elsewhere so often, milliseconds: it takes as long to turn.
+const GLANCE_MS: u64 = 600;
+
+/// Where to fly is chosen so often, milliseconds; over the ground looks are counted then.
+const CHOICE_MS: u64 = 1_000;
+
+/// For so long the UAV flies on with where the target should be, and only its camera searches,
+/// milliseconds.
+const FLIES_ON_MS: u64 = 4_000;
+
+/// A target that was lost may have gone so far at once, metres, and so fast, m/s.
+const STRAYS_M: f64 = 40.0;
+const STRAYS_MPS: f64 = 26.0;
+
+/// Who is seen within so long of its last sight is the same although it has another name,
+/// milliseconds.
+const OVERLAP_MS: u64 = 1_000;
+
+/// The share that a look has in the usual speed of a target, and from what on it drives, m/s.
+const SHARE: f64 = 0.05;
+const DRIVES_MPS: f64 = 3.0;
+
+/// No more targets are remembered.
+const MOST: usize = 64;
+
+/// A target that was seen.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    first_ms: u64,
+    last: LastSeen,
+}
+
+/// The targets that were seen, by name.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory {
+    known: BTreeMap<TargetName, Known>,
+}
+
+impl Memory {
+    /// Takes in what all know; `is_seen` says of a name whether a UAV saw it, and not only the
+    /// operator.
+    pub(super) fn learn(
+        &mut self,
+        targets: &[Fused],
+        is_seen: &dyn Fn(TargetName) -> bool,
+        now_ms: u64,
+    ) {
+        for t in targets.iter().filter(|t| is_seen(t.name)) {
+            let mps = t.estimate.velocity_mps().norm();
+            let before = self.known.get(&t.name).copied();
+            if before.is_some_and(|k| k.last.at_ms >= t.seen_ms) {
+                continue;
+            }
+            let usual_mps = match before.map(|k| k.last.usual_mps) {
+                Some(usual_mps) if mps > DRIVES_MPS => usual_mps + SHARE * (mps - usual_mps),
+                Some(usual_mps) => usual_mps,
+                None => mps,
+            };
+            let unseen_s = seconds(now_ms.saturating_sub(t.seen_ms));
+            let velocity_mps = t.estimate.velocity_mps();
+            let known = Known {
+                first_ms: before.map_or(t.seen_ms, |k| k.first_ms),
+                last: LastSeen {
+                    at_ms: t.seen_ms,
+                    at: t.estimate.position() - velocity_mps * unseen_s,
+                    spread_m: t.estimate.spread_m(),
+                    velocity_mps,
+                    usual_mps,
+                },
+            };
+            if before.is_some() || self.known.len() < MOST {
+                self.known.insert(t.name, known);
+            }
+        }
+        self.find(targets);
+    }
+
+    /// Who is lost and was found again under another name is not lost any more.
+    fn find(&mut self, targets: &[Fused]) {
+        let is_told = |name: &TargetName| targets.iter().any(|t| t.name == *name);
+        let lost: Vec<(TargetName, LastSeen)> = self
+            .known
+            .iter()
+            .filter(|(name, _)| !is_told(name))
+            .map(|(name, k)| (*name, k.last))
+            .collect();
+        for (name, last) in lost {
+            let is_it = |k: &Known| {
+                let since_s = seconds(k.last.at_ms.saturating_sub(last.at_ms));
+                let reach_m = STRAYS_M + STRAYS_MPS * since_s;
+                k.first_ms + OVERLAP_MS >= last.at_ms
+                    && k.last.at_ms > last.at_ms
+                    && (k.last.at - last.at).norm() <= reach_m
+            };
+            let heir = self.known.iter().find(|(n, k)| **n != name && is_it(k));
+            let Some(heir) = heir.map(|(n, _)| *n) else {
+                continue;
+            };
+            self.known.remove(&name);
+            if let Some(k) = self.known.get_mut(&heir) {
+                k.last.usual_mps = k.last.usual_mps.max(last.usual_mps);
+            }
+        }
+    }
+
+    /// What was known of a target when it was seen last.
+    pub(super) fn of(&self, name: TargetName) -> Option<LastSeen> {
+        self.known.get(&name).map(|k| k.last)
+    }
+
+    /// Those of whom nothing is told any more.
+    pub(super) fn lost(&self, targets: &[Fused]) -> Vec<Wanted> {
+        let is_told = |name: &TargetName| targets.iter().any(|t| t.name == *name);
+        let lost = self.known.iter().filter(|(name, _)| !is_told(name));
+        lost.map(|(name, k)| Wanted {
+            name: *name,
+            at: k.last.at,
+        })
+        .collect()
+    }
+}
+
+/// Chances of where a target is.
+#[derive(Clone, Debug)]
+enum Chances {
+    /// On streets.
+    Streets(StreetChances),
+    /// Anywhere on the ground.
+    Ground(Box<ChanceMap>),
+}
+
+/// A search for a target.
+#[derive(Clone, Debug)]
+pub(super) struct Search {
+    last: LastSeen,
+    chances: Chances,
+    looked_ms: u64,
+    glanced_ms: u64,
+    chosen_ms: u64,
+    glance: Option<Point>,
+    aim: Option<Point>,
+}
+
+impl Search {
+    /// Begins where the target was seen last.
+    pub(super) fn new(last: &LastSeen, streets: Option<&Streets>) -> Self {
+        let on_streets = streets.and_then(|s| StreetChances::new(s, last));
+        let chances = on_streets.map_or_else(
+            || {
+                let map = ChanceMap::new(last.at_ms, last.at, last.spread_m, last.velocity_mps);
+                Chances::Ground(Box::new(map))
+            },
+            Chances::Streets,
+        );
+        Self {
+            last: *last,
+            chances,
+            looked_ms: 0,
+            glanced_ms: 0,
+            chosen_ms: 0,
+            glance: None,
+            aim: None,
+        }
+    }
+
+    /// Whether it is the search for a target since it was seen last.
+    pub(super) fn is_of(&self, last: &LastSeen) -> bool {
+        self.last == *last
+    }
+
+    /// Where the camera looks.
+    pub(super) fn glance(&self) -> Option<Point> {
+        self.glance
+    }
+
+    /// Where it flies to.
+    pub(super) fn aim(&self) -> Option<Point> {
+        self.aim
+    }
+
+    /// The target as it is flown after: it stands where most is to be looked at.
+    pub(super) fn motion(&self, now_ms: u64) -> Option<TargetMotion> {
+        let flies_on = now_ms < self.last.at_ms + FLIES_ON_MS;
+        self.aim.filter(|_| !flies_on).map(|position| TargetMotion {
+            position,
+            velocity_mps: Vector::zeros(),
+            acceleration_mps2: Vector::zeros(),
+        })
+    }
+
+    /// The chances at this time, less what these cameras show.
+    pub(super) fn look(&mut self, cameras: &[Camera], town: &Town<'_>, now_ms: u64) {
+        let shows = |p: Point| cameras.iter().any(|c| c.sees(p, town.buildings));
+        match (&mut self.chances, town.streets) {
+            (Chances::Streets(chances), Some(streets)) => {
+                chances.go_on(streets, now_ms);
+                chances.look(streets, LEFT, &shows);
+            }
+            (Chances::Ground(map), _) => {
+                if self.looked_ms + CHOICE_MS <= now_ms {
+                    self.looked_ms = now_ms;
+                    map.go_on(now_ms);
+                    map.look(&shows);
+                }
+            }
+            (Chances::Streets(_), None) => {}
+        }
+    }
+
+    fn places(&self, town: &Town<'_>) -> Vec<(Point, f64)> {
+        match (&self.chances, town.streets) {
+            (Chances::Streets(chances), Some(streets)) => chances.places(streets),
+            (Chances::Ground(map), _) => map.places(),
+            (Chances::Streets(_), None) => Vec::new(),
+        }
+    }
+
+    /// Where the camera looks and where the UAV flies from now on; others fly to `others`.
+    pub(super) fn choose(
+        &mut self,
+        camera: &Camera,
+        town: &Town<'_>,
+        others: &[Point],
+        now_ms: u64,
+    ) {
+        let glances = self.glanced_ms + GLANCE_MS <= now_ms;
+        let flies = self.chosen_ms + CHOICE_MS <= now_ms;
+        if !glances && !flies {
+            return;
+        }
+        let places = self.places(town);
+        let from = camera.at();
+        if glances {
+            self.glanced_ms = now_ms;
+            let reach_m = camera.reach_m();
+            let shown: Vec<(Point, f64)> = places
+                .iter()
+                .copied()
+                .filter(|(p, _)| {
+                    (p - from).norm() <= reach_m && !camera.is_hidden(*p, town.buildings)
+                })
+                .collect();
+            let next = point_at(&shown, &|p| camera.shows_m(p));
+            self.glance = next.or(self.aim).or(Some(self.last.at));
+        }
+        if flies {
+            self.chosen_ms = now_ms;
+            let looker = Looker {
+                at: from,
+                airspeed_mps: super::airframe().cruise_mps,
+                reach_m: camera.reach_m(),
+            };
+            self.aim = fly_to(&places, &looker, self.aim, others).or(self.aim);
+        }
+    }
+}
