@@ -249,6 +249,7 @@ impl Judge {
         self.out.whole_s += step_s;
         self.out.seen_s += if seen { step_s } else { 0.0 };
         self.out.hidden_s += if framed && !seen { step_s } else { 0.0 };
+        self.out.covered_s += if t.is_covered { step_s } else { 0.0 };
         let keeps = self.drift_mps(t) * KEEPS <= fastest_mps;
         self.kept_since_s[i] = if keeps {
             self.kept_since_s[i].or(Some(now_s))

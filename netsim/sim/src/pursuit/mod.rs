@@ -28,7 +28,7 @@ pub mod vehicle;
 
 use crate::spec::Building;
 use crate::world::motion::Kinematic;
-use crate::world::obstacles::Obstacles;
+use crate::world::obstacles::{Obstacles, Place};
 use camera::Optics;
 use flyer::{Flyer, Statement};
 use judge::{Judge, Look};
@@ -165,6 +165,8 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Truth {
     motion: TargetMotion,
+    /// Whether it is below a roof, where nobody sees it.
+    is_covered: bool,
 }
 
 /// The fixed wing of the published comparisons: cruise 20 m/s, 30° of bank.
@@ -445,6 +447,7 @@ impl<'a> World<'a> {
                     velocity_mps: v.velocity_mps(),
                     acceleration_mps2: v.acceleration_mps2(),
                 },
+                is_covered: self.obstacles().is_some_and(|o| is_covered(v.at, o)),
             })
             .collect()
     }
@@ -465,6 +468,13 @@ impl<'a> World<'a> {
         }
         found.is_some()
     }
+}
+
+/// Whether a place is below a roof.
+fn is_covered(at: Point, obstacles: &Obstacles) -> bool {
+    const ABOVE_M: f64 = 1_000.0;
+    let place = |height_m| Place { at, height_m };
+    !obstacles.sees(place(0.0), place(ABOVE_M))
 }
 
 /// What an operator tells of the targets that nobody has seen yet: where they are, roughly.
