@@ -252,7 +252,10 @@ impl Flyer {
                 told.any(|r| r.author != OPERATOR)
             };
             self.memory.learn(&self.targets, &is_seen, now_ms);
-            wanted.extend(self.memory.lost(&self.targets));
+            // Who is lost is looked for by those who are left when all others are followed.
+            let spare = watches.len().saturating_sub(wanted.len());
+            let lost = self.memory.lost(&self.targets);
+            wanted.extend(lost.into_iter().take(spare));
         }
         let follows = assign(&watches, &wanted).follows.get(&self.id).copied();
         if follows.is_some() {

@@ -44,6 +44,9 @@ const STRAYS_MPS: f64 = 26.0;
 /// milliseconds.
 const OVERLAP_MS: u64 = 1_000;
 
+/// Who was watched for so long is no false alarm, milliseconds.
+const ESTABLISHED_MS: u64 = 3_000;
+
 /// The share that a look has in the usual speed of a target, and from what on it drives, m/s.
 const SHARE: f64 = 0.05;
 const DRIVES_MPS: f64 = 3.0;
@@ -136,15 +139,29 @@ impl Memory {
         self.known.get(&name).map(|k| k.last)
     }
 
-    /// Those of whom nothing is told any more.
+    /// Those of whom nothing is told any more, the latest first: such as were watched for a
+    /// while, for false alarms are not. Where none ever was, whatever was seen may be one.
     pub(super) fn lost(&self, targets: &[Fused]) -> Vec<Wanted> {
         let is_told = |name: &TargetName| targets.iter().any(|t| t.name == *name);
-        let lost = self.known.iter().filter(|(name, _)| !is_told(name));
-        lost.map(|(name, k)| Wanted {
+        let is_any = !self.known.values().any(Known::is_established);
+        let mut lost: Vec<(&TargetName, &Known)> = self
+            .known
+            .iter()
+            .filter(|(name, k)| !is_told(name) && (is_any || k.is_established()))
+            .collect();
+        lost.sort_by_key(|(name, k)| (core::cmp::Reverse(k.last.at_ms), **name));
+        let wanted = lost.into_iter().map(|(name, k)| Wanted {
             name: *name,
             at: k.last.at,
-        })
-        .collect()
+        });
+        wanted.collect()
+    }
+}
+
+impl Known {
+    /// Whether it was watched for so long that it is no false alarm.
+    fn is_established(&self) -> bool {
+        self.last.at_ms >= self.first_ms + ESTABLISHED_MS
     }
 }
 
