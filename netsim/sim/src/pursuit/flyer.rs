@@ -130,6 +130,11 @@ impl Flyer {
         self.switches + self.follower.as_ref().map_or(0, |f| f.switch().changes())
     }
 
+    pub(super) fn debug(&self, at: Point, town: &Town<'_>, o: Option<&Obstacles>) -> String {
+        let s = self.search.as_ref().map_or("-".to_owned(), |s| s.debug(at, town));
+        format!("f {:?} t {} d {:.0} sees {} hid {} fused {:?} {}", self.follows.map(|n| (n.author, n.number)), self.targets.len(), (self.body.position()-at).norm(), u8::from(self.camera.sees(at,o)), u8::from(self.camera.is_hidden(at,o)), self.target().map(|t| ((t.estimate.position()-at).norm() as i32)), s)
+    }
+
     /// Whether the middle of its circle is aside of the target.
     pub(super) fn is_aside(&self) -> bool {
         self.beside != Vector::zeros()
@@ -288,7 +293,8 @@ impl Flyer {
         // Of two the one of the lesser number goes where both would.
         let lesser = self.searched.iter().filter(|(id, _)| **id < self.id);
         let others: Vec<Point> = lesser.map(|(_, at)| *at).collect();
-        search.choose(camera, town, &others, now_ms);
+        let again = self.follows.and_then(|n| self.memory.again(n, now_ms));
+        search.choose(camera, town, (&others, again), now_ms);
         self.search = Some(search);
     }
 

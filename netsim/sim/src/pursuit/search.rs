@@ -51,6 +51,14 @@ const ESTABLISHED_MS: u64 = 3_000;
 const SHARE: f64 = 0.05;
 const DRIVES_MPS: f64 = 3.0;
 
+/// Who was out of sight is seen again by so many sightings, each within this of that before,
+/// milliseconds.
+const AGAIN: u32 = 3;
+const AGAIN_MS: u64 = 1_000;
+
+/// Two names at one place within this are of one target, metres.
+const TWIN_M: f64 = 30.0;
+
 /// No more targets are remembered.
 const MOST: usize = 64;
 
@@ -59,6 +67,10 @@ const MOST: usize = 64;
 struct Known {
     first_ms: u64,
     last: LastSeen,
+    /// Who was where it was when it was seen last: another name of the same, most likely.
+    twin: Option<TargetName>,
+    /// Sightings since it was out of sight: how many, when the last was, and where.
+    again: Option<(u32, u64, Point)>,
 }
 
 /// The targets that were seen, by name.
@@ -77,30 +89,27 @@ impl Memory {
         now_ms: u64,
     ) {
         for t in targets.iter().filter(|t| is_seen(t.name)) {
-            let mps = t.estimate.velocity_mps().norm();
             let before = self.known.get(&t.name).copied();
-            if before.is_some_and(|k| k.last.at_ms >= t.seen_ms) {
-                continue;
-            }
-            let usual_mps = match before.map(|k| k.last.usual_mps) {
-                Some(usual_mps) if mps > DRIVES_MPS => usual_mps + SHARE * (mps - usual_mps),
-                Some(usual_mps) => usual_mps,
-                None => mps,
-            };
-            let unseen_s = seconds(now_ms.saturating_sub(t.seen_ms));
-            let velocity_mps = t.estimate.velocity_mps();
-            let known = Known {
-                first_ms: before.map_or(t.seen_ms, |k| k.first_ms),
-                last: LastSeen {
-                    at_ms: t.seen_ms,
-                    at: t.estimate.position() - velocity_mps * unseen_s,
-                    spread_m: t.estimate.spread_m(),
-                    velocity_mps,
-                    usual_mps,
-                },
-            };
-            if before.is_some() || self.known.len() < MOST {
-                self.known.insert(t.name, known);
+            let at = t.estimate.position();
+            let twin = targets.iter().find(|u| {
+                u.name != t.name && (u.estimate.position() - at).norm() <= TWIN_M
+            });
+            match before.map(|k| k.seen(t, now_ms)) {
+                Some(None) => {}
+                Some(Some(known)) => {
+                    let twin = twin.map(|u| u.name);
+                    self.known.insert(t.name, Known { twin, ..known });
+                }
+                None if self.known.len() < MOST => {
+                    let known = Known {
+                        first_ms: t.seen_ms,
+                        last: last_seen(t, t.estimate.velocity_mps().norm(), now_ms),
+                        twin: twin.map(|u| u.name),
+                        again: None,
+                    };
+                    self.known.insert(t.name, known);
+                }
+                None => {}
             }
         }
         self.find(targets);
@@ -109,13 +118,13 @@ impl Memory {
     /// Who is lost and was found again under another name is not lost any more.
     fn find(&mut self, targets: &[Fused]) {
         let is_told = |name: &TargetName| targets.iter().any(|t| t.name == *name);
-        let lost: Vec<(TargetName, LastSeen)> = self
+        let lost: Vec<(TargetName, LastSeen, Option<TargetName>)> = self
             .known
             .iter()
             .filter(|(name, _)| !is_told(name))
-            .map(|(name, k)| (*name, k.last))
+            .map(|(name, k)| (*name, k.last, k.twin))
             .collect();
-        for (name, last) in lost {
+        for (name, last, twin) in lost {
             let is_it = |k: &Known| {
                 let since_s = seconds(k.last.at_ms.saturating_sub(last.at_ms));
                 let reach_m = STRAYS_M + STRAYS_MPS * since_s;
@@ -123,7 +132,11 @@ impl Memory {
                     && k.last.at_ms > last.at_ms
                     && (k.last.at - last.at).norm() <= reach_m
             };
-            let heir = self.known.iter().find(|(n, k)| **n != name && is_it(k));
+            let is_twin = |n: &TargetName, k: &Known| {
+                twin == Some(*n) && k.last.at_ms + OVERLAP_MS >= last.at_ms
+            };
+            let mut others = self.known.iter().filter(|(n, _)| **n != name);
+            let heir = others.find(|(n, k)| is_twin(n, k) || is_it(k));
             let Some(heir) = heir.map(|(n, _)| *n) else {
                 continue;
             };
@@ -132,6 +145,12 @@ impl Memory {
                 k.last.usual_mps = k.last.usual_mps.max(last.usual_mps);
             }
         }
+    }
+
+    /// Where one that was out of sight may just have been seen.
+    pub(super) fn again(&self, name: TargetName, now_ms: u64) -> Option<Point> {
+        let (_, ms, at) = self.known.get(&name)?.again?;
+        (ms + AGAIN_MS >= now_ms).then_some(at)
     }
 
     /// What was known of a target when it was seen last.
@@ -158,7 +177,52 @@ impl Memory {
     }
 }
 
+/// What was seen of a target, as it was when it was seen.
+fn last_seen(t: &Fused, usual_mps: f64, now_ms: u64) -> LastSeen {
+    let unseen_s = seconds(now_ms.saturating_sub(t.seen_ms));
+    let velocity_mps = t.estimate.velocity_mps();
+    LastSeen {
+        at_ms: t.seen_ms,
+        at: t.estimate.position() - velocity_mps * unseen_s,
+        spread_m: t.estimate.spread_m(),
+        velocity_mps,
+        usual_mps,
+    }
+}
+
 impl Known {
+    /// What is known after a look; nothing if that did not show it. Who was out of sight is
+    /// seen again when it was so often: a false alarm is not it.
+    fn seen(&self, t: &Fused, now_ms: u64) -> Option<Self> {
+        let (before_ms, many) = match self.again {
+            Some((many, ms, _)) => (ms, many),
+            None => (self.last.at_ms, AGAIN),
+        };
+        if t.seen_ms <= before_ms {
+            return None;
+        }
+        let many = if t.seen_ms > before_ms + AGAIN_MS {
+            1
+        } else {
+            (many + 1).min(AGAIN)
+        };
+        if many < AGAIN {
+            let again = Some((many, t.seen_ms, t.estimate.position()));
+            return Some(Self { again, ..*self });
+        }
+        let (mps, usual_mps) = (t.estimate.velocity_mps().norm(), self.last.usual_mps);
+        let usual_mps = if mps > DRIVES_MPS {
+            usual_mps + SHARE * (mps - usual_mps)
+        } else {
+            usual_mps
+        };
+        Some(Self {
+            last: last_seen(t, usual_mps, now_ms),
+            again: None,
+            ..*self
+        })
+    }
+
     /// Whether it was watched for so long that it is no false alarm.
     fn is_established(&self) -> bool {
         self.last.at_ms >= self.first_ms + ESTABLISHED_MS
@@ -208,6 +272,11 @@ impl Search {
         }
     }
 
+    pub(super) fn debug(&self, at: Point, town: &Town<'_>) -> String {
+        let near: f64 = self.places(town).iter().filter(|p| (p.0-at).norm() < 60.0).map(|p| p.1).sum();
+        let d = |p: Option<Point>| p.map(|p| (p-at).norm() as i32);
+        format!("S u {:.1} near {near:.3} aim {:?} gl {:?} n {}", self.last.usual_mps, d(self.aim), d(self.glance), self.places(town).len())
+    }
     /// Whether it is the search for a target since it was seen last.
     pub(super) fn is_of(&self, last: &LastSeen) -> bool {
         self.last == *last
@@ -265,12 +334,13 @@ impl Search {
         &mut self,
         camera: &Camera,
         town: &Town<'_>,
-        others: &[Point],
+        (others, again): (&[Point], Option<Point>),
         now_ms: u64,
     ) {
         let glances = self.glanced_ms + GLANCE_MS <= now_ms;
         let flies = self.chosen_ms + CHOICE_MS <= now_ms;
         if !glances && !flies {
+            self.glance = again.or(self.glance);
             return;
         }
         let places = self.places(town);
@@ -288,6 +358,7 @@ impl Search {
             let next = point_at(&shown, &|p| camera.shows_m(p));
             self.glance = next.or(self.aim).or(Some(self.last.at));
         }
+        self.glance = again.or(self.glance);
         if flies {
             self.chosen_ms = now_ms;
             let looker = Looker {

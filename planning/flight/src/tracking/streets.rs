@@ -248,8 +248,9 @@ fn cut(from: Point, to: Point, pieces: &mut Vec<Piece>) -> bool {
     }
     let mut k = 0.0;
     while k < count {
-        let at = |share: f64| from + (to - from) * share;
-        let (a, b) = (at(k / count), at((k + 1.0) / count));
+        // The last one ends where the next street begins, to the last digit.
+        let at = |k: f64| if k < count { from + (to - from) * (k / count) } else { to };
+        let (a, b) = (at(k), at(k + 1.0));
         if pieces.len() + 2 > MOST_PIECES {
             return false;
         }
@@ -377,13 +378,15 @@ impl StreetChances {
         self.drives = next;
     }
 
-    /// Pieces for whose middle `shows` holds were looked at, and it was not seen there; a look
-    /// leaves the share `left` of what was there.
+    /// Pieces for whose ends and middle `shows` holds were looked at, and it was not seen there; a
+    /// look leaves the share `left` of what was there.
     pub fn look(&mut self, streets: &Streets, left: f64, shows: &dyn Fn(Point) -> bool) {
         let mut seen = false;
         for n in (0..self.drives.len()).step_by(2) {
             let here = self.of_ground(n);
-            if here > NOTHING && shows(streets.pieces[n].middle()) {
+            let piece = &streets.pieces[n];
+            let is_shown = || shows(piece.middle()) && shows(piece.from) && shows(piece.to);
+            if here > NOTHING && is_shown() {
                 seen = true;
                 for m in [n, n + 1] {
                     self.drives[m] *= left;
