@@ -5,8 +5,8 @@
 //! exactly: then it is the guidance that is measured.
 
 use super::camera::{Attitude, Camera};
-use super::sensor::{Noise, Seen, Sensor};
 use super::search::{Memory, Search};
+use super::sensor::{Noise, Seen, Sensor};
 use super::{DENSITY, FOLLOWED, LOOK_MS, OPERATOR, Settings, Town};
 use crate::world::motion::Kinematic;
 use crate::world::obstacles::Obstacles;
@@ -128,11 +128,6 @@ impl Flyer {
     /// How often it changed between loiter and weave.
     pub(super) fn switches(&self) -> u32 {
         self.switches + self.follower.as_ref().map_or(0, |f| f.switch().changes())
-    }
-
-    pub(super) fn debug(&self, at: Point, town: &Town<'_>, o: Option<&Obstacles>) -> String {
-        let s = self.search.as_ref().map_or("-".to_owned(), |s| s.debug(at, town));
-        format!("f {:?} t {} d {:.0} sees {} hid {} fused {:?} {}", self.follows.map(|n| (n.author, n.number)), self.targets.len(), (self.body.position()-at).norm(), u8::from(self.camera.sees(at,o)), u8::from(self.camera.is_hidden(at,o)), self.target().map(|t| ((t.estimate.position()-at).norm() as i32)), s)
     }
 
     /// Whether the middle of its circle is aside of the target.

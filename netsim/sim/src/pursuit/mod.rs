@@ -364,12 +364,6 @@ impl<'a> World<'a> {
             let own: Vec<Register> = f.registers().copied().collect();
             self.judge.consistency(now_ms, &truth, &own, f.targets());
         }
-        if std::env::var("DBG").is_ok() && now_ms % 1000 == 0 {
-            let t = truth[0].motion; 
-            eprint!("{:5.0} cov {} v {:.1}", now_ms as f64/1e3, u8::from(truth[0].is_covered), t.velocity_mps.norm());
-            for f in &self.flyers { eprint!(" | {} {}", f.id, f.debug(t.position, &town, obstacles)); }
-            eprintln!();
-        }
         let is_exact = self.settings.noise.is_none();
         let exact: Vec<Option<TargetMotion>> = self
             .flyers

@@ -91,9 +91,9 @@ impl Memory {
         for t in targets.iter().filter(|t| is_seen(t.name)) {
             let before = self.known.get(&t.name).copied();
             let at = t.estimate.position();
-            let twin = targets.iter().find(|u| {
-                u.name != t.name && (u.estimate.position() - at).norm() <= TWIN_M
-            });
+            let twin = targets
+                .iter()
+                .find(|u| u.name != t.name && (u.estimate.position() - at).norm() <= TWIN_M);
             match before.map(|k| k.seen(t, now_ms)) {
                 Some(None) => {}
                 Some(Some(known)) => {
@@ -272,11 +272,6 @@ impl Search {
         }
     }
 
-    pub(super) fn debug(&self, at: Point, town: &Town<'_>) -> String {
-        let near: f64 = self.places(town).iter().filter(|p| (p.0-at).norm() < 60.0).map(|p| p.1).sum();
-        let d = |p: Option<Point>| p.map(|p| (p-at).norm() as i32);
-        format!("S u {:.1} near {near:.3} aim {:?} gl {:?} n {}", self.last.usual_mps, d(self.aim), d(self.glance), self.places(town).len())
-    }
     /// Whether it is the search for a target since it was seen last.
     pub(super) fn is_of(&self, last: &LastSeen) -> bool {
         self.last == *last

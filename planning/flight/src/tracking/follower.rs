@@ -263,13 +263,7 @@ impl Follower {
     /// Where it would be after each of so many steps of `step_s` seconds, if the target moved so,
     /// by a copy of it; no zones are looked at.
     #[must_use]
-    pub fn ahead(
-        &self,
-        pose: Pose,
-        wind: Wind,
-        step_s: f64,
-        moves: &[TargetMotion],
-    ) -> Vec<Pose> {
+    pub fn ahead(&self, pose: Pose, wind: Wind, step_s: f64, moves: &[TargetMotion]) -> Vec<Pose> {
         let mut own = self.clone();
         let Some(first) = moves.first() else {
             return Vec::new();

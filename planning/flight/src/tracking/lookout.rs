@@ -115,3 +115,38 @@ fn square(p: Point) -> (i64, i64) {
     let nth = |m: f64| (m / SQUARE_M).floor() as i64;
     (nth(p.x), nth(p.y))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x: f64, chance: f64) -> Place {
+        (Point::new(x, 0.0), chance)
+    }
+
+    #[test]
+    fn the_camera_is_pointed_where_one_picture_shows_most() {
+        let places = [at(0.0, 0.3), at(200.0, 0.2), at(210.0, 0.2), at(220.0, 0.1)];
+        let found = point_at(&places, &|_| 30.0).unwrap();
+        assert!(found.x > 190.0, "{found}");
+        assert_eq!(point_at(&places, &|_| 5.0), Some(Point::new(0.0, 0.0)));
+        assert_eq!(point_at(&[], &|_| 5.0), None);
+    }
+
+    #[test]
+    fn the_uav_flies_where_most_is_soonest_stays_with_it_and_leaves_others_theirs() {
+        let looker = Looker {
+            at: Point::new(0.0, 0.0),
+            airspeed_mps: 20.0,
+            reach_m: 200.0,
+        };
+        let places = [at(150.0, 0.4), at(900.0, 0.6)];
+        let fly = |before, others: &[Point]| fly_to(&places, &looker, before, others).unwrap().x;
+        assert!((fly(None, &[]) - 150.0).abs() < 1e-9);
+        // From here the far one is worth less than seven tenths.
+        assert!((fly(Some(Point::new(900.0, 0.0)), &[]) - 150.0).abs() < 1e-9);
+        assert!((fly(Some(Point::new(170.0, 0.0)), &[]) - 170.0).abs() < 1e-9);
+        assert!((fly(None, &[Point::new(140.0, 0.0)]) - 900.0).abs() < 1e-9);
+        assert_eq!(fly_to(&[], &looker, None, &[]), None);
+    }
+}

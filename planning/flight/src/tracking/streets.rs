@@ -209,8 +209,12 @@ impl Streets {
                 let here = &self.pieces[way.piece];
                 left_m -= here.length_m - way.on_m;
                 way.on_m = 0.0;
-                let straight = |n: &&u32| here.direction().dot(&self.pieces[**n as usize].direction());
-                let best = here.next.iter().max_by(|a, b| straight(a).total_cmp(&straight(b)));
+                let straight =
+                    |n: &&u32| here.direction().dot(&self.pieces[**n as usize].direction());
+                let best = here
+                    .next
+                    .iter()
+                    .max_by(|a, b| straight(a).total_cmp(&straight(b)));
                 let Some(best) = best else { break };
                 for other in here.next.iter().filter(|n| *n != best) {
                     if room > 0 {
@@ -249,7 +253,13 @@ fn cut(from: Point, to: Point, pieces: &mut Vec<Piece>) -> bool {
     let mut k = 0.0;
     while k < count {
         // The last one ends where the next street begins, to the last digit.
-        let at = |k: f64| if k < count { from + (to - from) * (k / count) } else { to };
+        let at = |k: f64| {
+            if k < count {
+                from + (to - from) * (k / count)
+            } else {
+                to
+            }
+        };
         let (a, b) = (at(k), at(k + 1.0));
         if pieces.len() + 2 > MOST_PIECES {
             return false;
@@ -411,5 +421,140 @@ impl StreetChances {
         all.map(|n| (streets.pieces[n].middle(), self.of_ground(n)))
             .filter(|(_, chance)| *chance > NOTHING)
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn line(points: &[(f64, f64)]) -> Vec<Point> {
+        points.iter().map(|(x, y)| Point::new(*x, *y)).collect()
+    }
+
+    /// A street from west to east that another one crosses at the origin.
+    fn crossing() -> Streets {
+        let along = line(&[(-300.0, 0.0), (0.0, 0.0), (300.0, 0.0)]);
+        let across = line(&[(0.0, -300.0), (0.0, 0.0), (0.0, 300.0)]);
+        Streets::of(&[along, across]).unwrap()
+    }
+
+    fn last(velocity_mps: Vector) -> LastSeen {
+        LastSeen {
+            at_ms: 0,
+            at: Point::new(-100.0, 1.0),
+            spread_m: 5.0,
+            velocity_mps,
+            usual_mps: 8.0,
+        }
+    }
+
+    fn near(chances: &StreetChances, streets: &Streets, at: Point, radius_m: f64) -> f64 {
+        let places = chances.places(streets);
+        let near = places.iter().filter(|(p, _)| (p - at).norm() <= radius_m);
+        near.map(|(_, chance)| chance).sum()
+    }
+
+    #[test]
+    fn a_target_drives_on_along_its_street_and_parts_at_a_crossing() {
+        let streets = crossing();
+        assert_eq!(streets.len(), 4 * 2 * 25);
+        let ways = streets.ways(Point::new(-100.0, 1.0), Vector::new(10.0, 0.0), 2.0, 12);
+        assert_eq!(ways.len(), 3);
+        assert!(ways.iter().all(|w| w.len() == 12));
+        // All are one until the crossing; the first is the straight one.
+        assert!(
+            ways.iter()
+                .all(|w| (w[3] - Point::new(-20.0, 0.0)).norm() < 1e-6)
+        );
+        assert!(
+            (ways[0][11] - Point::new(140.0, 0.0)).norm() < 1e-6,
+            "{ways:?}"
+        );
+        let ends: Vec<f64> = ways[1..].iter().map(|w| w[11].y).collect();
+        assert!((ends[0] + ends[1]).abs() < 1e-6 && (ends[0].abs() - 140.0).abs() < 1e-6);
+        // Who is on no street has none, and who stands stays.
+        assert!(
+            streets
+                .ways(Point::new(100.0, 100.0), Vector::zeros(), 2.0, 3)
+                .is_empty()
+        );
+        let stays = streets.ways(Point::new(-100.0, 1.0), Vector::zeros(), 2.0, 3);
+        assert!((stays[0][2] - Point::new(-100.0, 0.0)).norm() < 1e-6);
+    }
+
+    #[test]
+    fn in_a_dead_end_it_turns_round() {
+        let streets = Streets::of(&[line(&[(0.0, 0.0), (60.0, 0.0)])]).unwrap();
+        let ways = streets.ways(Point::new(50.0, 0.0), Vector::new(10.0, 0.0), 1.0, 3);
+        assert!(
+            (ways[0][2] - Point::new(40.0, 0.0)).norm() < 1e-6,
+            "{ways:?}"
+        );
+    }
+
+    #[test]
+    fn chances_drive_on_and_what_was_looked_at_is_elsewhere() {
+        let streets = crossing();
+        let mut chances = StreetChances::new(&streets, &last(Vector::new(8.0, 0.0))).unwrap();
+        assert!(near(&chances, &streets, Point::new(-100.0, 0.0), 25.0) > 0.95);
+        chances.go_on(&streets, 20_000);
+        // 160 m on it is behind the crossing, in three streets.
+        let arms = [(60.0, 0.0), (0.0, 60.0), (0.0, -60.0)];
+        for (x, y) in arms {
+            let here = near(&chances, &streets, Point::new(x, y), 59.0);
+            assert!((0.15..0.4).contains(&here), "{x} {y}: {here}");
+        }
+        for _ in 0..20 {
+            chances.look(&streets, 0.5, &|p| p.x > 1.0);
+        }
+        let east = near(&chances, &streets, Point::new(150.0, 0.0), 130.0);
+        let north = near(&chances, &streets, Point::new(0.0, 60.0), 59.0);
+        assert!(east < 0.01 && north > 0.3, "{east} {north}");
+    }
+
+    /// A house hides one end of a piece: it was not looked at.
+    #[test]
+    fn a_piece_that_is_shown_in_part_was_not_looked_at() {
+        let streets = crossing();
+        let at = Point::new(-100.0, 0.0);
+        let begun = StreetChances::new(&streets, &last(Vector::zeros())).unwrap();
+        let mut looked = begun.clone();
+        looked.look(&streets, 0.5, &|p| (p - at).norm() <= 4.0);
+        assert_eq!(looked, begun);
+    }
+
+    #[test]
+    fn lines_that_are_no_streets_are_refused() {
+        assert_eq!(Streets::of(&[]), None);
+        assert_eq!(Streets::of(&[vec![Point::new(f64::NAN, 0.0); 3]]), None);
+        assert_eq!(Streets::of(&[line(&[(0.0, 0.0), (1e9, 0.0)])]), None);
+        assert_eq!(
+            StreetChances::new(
+                &crossing(),
+                &LastSeen {
+                    at: Point::new(100.0, 100.0),
+                    ..last(Vector::zeros())
+                }
+            ),
+            None
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn all_of_it_is_somewhere(
+            vx in -20.0..20.0_f64, vy in -20.0..20.0_f64, s in 0_u64..90, x in -300.0..300.0_f64,
+        ) {
+            let streets = crossing();
+            let mut chances = StreetChances::new(&streets, &last(Vector::new(vx, vy))).unwrap();
+            chances.go_on(&streets, s * 1000);
+            chances.look(&streets, 0.5, &|p| p.x > x);
+            chances.go_on(&streets, s * 1500);
+            let all: f64 = chances.drives.iter().chain(&chances.stands).sum();
+            prop_assert!((all - 1.0).abs() < 1e-9);
+            prop_assert!(chances.drives.iter().chain(&chances.stands).all(|c| *c >= 0.0));
+        }
     }
 }

@@ -168,7 +168,9 @@ impl<'a> Scene<'a> {
         view: &'a View<'a>,
     ) -> Self {
         let (at, velocity_mps) = (target.position, target.velocity_mps);
-        let known = view.streets.map(|s| s.ways(at, velocity_mps, SAMPLE_S, SAMPLES));
+        let known = view
+            .streets
+            .map(|s| s.ways(at, velocity_mps, SAMPLE_S, SAMPLES));
         let mut ways = known.unwrap_or_default();
         if ways.is_empty() {
             let straight = |k: f64| at + velocity_mps * (k * SAMPLE_S);
@@ -256,9 +258,7 @@ impl<'a> Scene<'a> {
                 // Ways are one until they part.
                 let sees = match before {
                     Some((same, sees)) if same == at => sees,
-                    _ => {
-                        (at - from).norm() <= self.view.reach_m && (self.view.sees)(from, at)
-                    }
+                    _ => (at - from).norm() <= self.view.reach_m && (self.view.sees)(from, at),
                 };
                 before = Some((at, sees));
                 seen += if sees { counts } else { 0.0 };
@@ -280,4 +280,137 @@ fn numbers(count: usize) -> impl Iterator<Item = f64> {
 #[allow(clippy::cast_precision_loss, reason = "a few")]
 fn whole(count: usize) -> f64 {
     count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::flyable::tests::airframe;
+    use super::super::follower::{Settings, fly};
+    use super::super::mode::Airspeeds;
+    use super::*;
+    use crate::tracking::field::Field;
+
+    /// How high the UAV flies above the target, and fronts along an east-west street, metres.
+    const HEIGHT_M: f64 = 120.0;
+    const FRONT_M: f64 = 35.0;
+    const HALF_M: f64 = 12.0;
+
+    fn follower() -> Follower {
+        Follower::new(Settings {
+            airframe: airframe(),
+            airspeeds: Airspeeds::of(&airframe()),
+            field: Field::HOPF,
+            stand_off: StandOff::Distance(150.0),
+        })
+    }
+
+    fn target(at: Point, mps: f64) -> TargetMotion {
+        TargetMotion {
+            position: at,
+            velocity_mps: Vector::new(mps, 0.0),
+            acceleration_mps2: Vector::zeros(),
+        }
+    }
+
+    /// Whether the line of sight clears the fronts to both sides of the street.
+    fn canyon(from: Point, at: Point) -> bool {
+        let beside_m = (from.y - at.y).abs();
+        if beside_m <= HALF_M {
+            return true;
+        }
+        HEIGHT_M * HALF_M / beside_m >= FRONT_M
+    }
+
+    /// The share of sight over ten minutes after a target, by the circle that is chosen or by
+    /// that of the stand-off, how often it changed, and the least radius.
+    fn flown(mps: f64, sees: &dyn Fn(Point, Point) -> bool, chooses: bool) -> (f64, u32, f64) {
+        let (mut follower, mut vantage) = (follower(), Vantage::default());
+        let mut pose = Pose::new(Point::new(-150.0, 0.0), 1.0);
+        let (mut seen, mut changes, mut least_m) = (0.0, 0, f64::INFINITY);
+        let mut before = None;
+        for k in 0..3_000_u64 {
+            #[allow(clippy::cast_precision_loss, reason = "some thousands")]
+            let mut motion = target(Point::new(mps * 0.2 * k as f64, 0.0), mps);
+            seen += f64::from(u8::from(sees(pose.position(), motion.position))) / 3_000.0;
+            if chooses {
+                let view = View {
+                    sees,
+                    reach_m: 219.0,
+                    streets: None,
+                };
+                let by = (pose, Wind::CALM);
+                let circle = vantage
+                    .choose(&follower, by, &motion, &view, k * 200)
+                    .unwrap();
+                changes += u32::from(before.is_some_and(|b| b != circle));
+                before = Some(circle);
+                least_m = least_m.min(circle.radius_m);
+                follower.circle(Some(circle.radius_m));
+                motion.position += circle.beside;
+            }
+            for c in follower.commands(pose, Wind::CALM, &motion, 0.2, None) {
+                pose = fly(&pose, &c, Wind::CALM);
+            }
+        }
+        (seen, changes, least_m)
+    }
+
+    #[test]
+    fn in_a_street_between_fronts_more_is_seen_and_the_circle_can_be_flown() {
+        for mps in [0.0, 6.0] {
+            let (asked, ..) = flown(mps, &canyon, false);
+            let (chosen, changes, least_m) = flown(mps, &canyon, true);
+            assert!(chosen > asked + 0.08, "{mps}: {asked} {chosen}");
+            // Not more than once in five seconds.
+            assert!(changes <= 120, "{mps}: {changes} changes");
+            let airspeeds = Airspeeds::of(&airframe());
+            let flyable_m = least_radius_m(&airframe(), airspeeds.of_loiter_mps(mps), mps, 0.0);
+            assert!(least_m >= flyable_m.unwrap(), "{least_m}");
+        }
+    }
+
+    #[test]
+    fn where_nothing_hides_the_stand_off_is_flown() {
+        let (seen, changes, least_m) = flown(6.0, &|_, _| true, true);
+        assert!(seen > 0.999 && changes == 0 && (least_m - 150.0).abs() < 1e-9);
+        // And again once what hid it is behind.
+        let (mut vantage, follower) = (Vantage::default(), follower());
+        let pose = Pose::new(Point::new(0.0, -150.0), 0.0);
+        let mut choose = |sees: &dyn Fn(Point, Point) -> bool, now_ms| {
+            let view = View {
+                sees,
+                reach_m: 219.0,
+                streets: None,
+            };
+            let target = target(Point::origin(), 0.0);
+            vantage.choose(&follower, (pose, Wind::CALM), &target, &view, now_ms)
+        };
+        let hidden = choose(&canyon, 0).unwrap();
+        assert!(
+            hidden.radius_m < 150.0 || hidden.beside.norm() > 0.0,
+            "{hidden:?}"
+        );
+        // Between two choices it stays.
+        assert_eq!(choose(&|_, _| true, 900), Some(hidden));
+        let open = choose(&|_, _| true, 1_000).unwrap();
+        assert_eq!((open.radius_m, open.beside), (150.0, Vector::zeros()));
+    }
+
+    #[test]
+    fn a_target_of_no_number_and_a_place_beside_have_no_circle() {
+        let view = View {
+            sees: &|_, _| true,
+            reach_m: 219.0,
+            streets: None,
+        };
+        let pose = (Pose::new(Point::origin(), 0.0), Wind::CALM);
+        let nowhere = target(Point::new(f64::NAN, 0.0), 3.0);
+        let choose = |f: &Follower, t| Vantage::default().choose(f, pose, t, &view, 0);
+        assert_eq!(choose(&follower(), &nowhere), None);
+        let beside = Follower::new(Settings {
+            stand_off: StandOff::bearing(0.0, 50.0),
+            ..*follower().settings()
+        });
+        assert_eq!(choose(&beside, &target(Point::origin(), 3.0)), None);
+    }
 }
