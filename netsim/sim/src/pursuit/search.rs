@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 
 /// What a look leaves of the chance that it is there after all: nine of ten are recognised, but
 /// looks that follow each other are alike.
-const LEFT: f64 = 0.5;
+const LEFT: f64 = 0.7;
 
 /// A camera is pointed elsewhere so often, milliseconds: it takes as long to turn.
 const GLANCE_MS: u64 = 600;
@@ -34,7 +34,7 @@ const CHOICE_MS: u64 = 1_000;
 
 /// For so long the UAV flies on with where the target should be, and only its camera searches,
 /// milliseconds.
-const FLIES_ON_MS: u64 = 4_000;
+const FLIES_ON_MS: u64 = 2_500;
 
 /// A target that was lost may have gone so far at once, metres, and so fast, m/s.
 const STRAYS_M: f64 = 40.0;
