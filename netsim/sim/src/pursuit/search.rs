@@ -365,3 +365,103 @@ impl Search {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix4, Vector4};
+    use skein_flight::tracking::estimate::Estimate;
+    use skein_flight::tracking::tracks::Kind;
+
+    fn name(number: u32) -> TargetName {
+        TargetName { author: 1, number }
+    }
+
+    /// What is told of a target that drives east at 8 m/s, seen `unseen_ms` ago.
+    fn told(number: u32, x: f64, now_ms: u64, unseen_ms: u64) -> Fused {
+        Fused {
+            name: name(number),
+            kind: Kind(1),
+            estimate: Estimate {
+                time_ms: now_ms,
+                state: Vector4::new(x, 0.0, 8.0, 0.0),
+                covariance: Matrix4::identity(),
+            },
+            seen_ms: now_ms - unseen_ms,
+            authors: 1,
+        }
+    }
+
+    /// Target 1 was seen until a time, milliseconds.
+    fn seen_until(until_ms: u64) -> Memory {
+        let mut memory = Memory::default();
+        for ms in (0..=until_ms).step_by(200) {
+            memory.learn(&[told(1, 8.0 * seconds(ms), ms, 0)], &|_| true, ms);
+        }
+        memory
+    }
+
+    fn lost(memory: &Memory, targets: &[Fused]) -> Vec<TargetName> {
+        memory.lost(targets).iter().map(|w| w.name).collect()
+    }
+
+    #[test]
+    fn one_sighting_is_a_false_alarm_and_three_are_the_target() {
+        let mut memory = seen_until(4_000);
+        let before = memory.of(name(1)).unwrap();
+        assert!((before.at.x - 32.0).abs() < 1e-9 && before.at_ms == 4_000);
+        for (nth, ms) in [9_000, 9_200, 9_400].into_iter().enumerate() {
+            assert_eq!(memory.of(name(1)), Some(before), "{nth}");
+            memory.learn(&[told(1, 90.0, ms, 0)], &|_| true, ms);
+            let again = memory.again(name(1), ms);
+            assert_eq!(again.is_some(), nth < 2);
+        }
+        assert_eq!(memory.of(name(1)).unwrap().at_ms, 9_400);
+        // Two with a pause between them are two false alarms.
+        let mut memory = seen_until(4_000);
+        for ms in [9_000, 12_000, 15_000] {
+            memory.learn(&[told(1, 90.0, ms, 0)], &|_| true, ms);
+        }
+        assert_eq!(memory.of(name(1)), Some(before));
+    }
+
+    #[test]
+    fn who_is_lost_is_wanted_until_it_is_found_under_another_name() {
+        let mut memory = seen_until(4_000);
+        assert_eq!(lost(&memory, &[]), vec![name(1)]);
+        // A false alarm far away is not it, nor is it wanted once it is over.
+        memory.learn(&[told(2, 900.0, 6_000, 0)], &|_| true, 6_000);
+        assert_eq!(lost(&memory, &[]), vec![name(1)]);
+        memory.learn(&[told(3, 100.0, 9_000, 0)], &|_| true, 9_000);
+        assert!(lost(&memory, &[told(3, 100.0, 9_000, 0)]).is_empty());
+    }
+
+    #[test]
+    fn two_names_at_one_place_are_one_target() {
+        let mut memory = Memory::default();
+        for ms in (0..=8_000).step_by(200) {
+            let x = 8.0 * seconds(ms);
+            let both = [told(1, x, ms, 0), told(2, x + 5.0, ms, 0)];
+            memory.learn(&both, &|_| true, ms);
+        }
+        let left = [told(1, 72.0, 9_000, 0)];
+        memory.learn(&left, &|_| true, 9_000);
+        assert!(lost(&memory, &left).is_empty());
+        // Two that were apart were two.
+        let mut memory = Memory::default();
+        for ms in (0..=8_000).step_by(200) {
+            let x = 8.0 * seconds(ms);
+            let both = [told(1, x, ms, 0), told(2, x + 200.0, ms, 0)];
+            memory.learn(&both, &|_| true, ms);
+        }
+        memory.learn(&left, &|_| true, 9_000);
+        assert_eq!(lost(&memory, &left), vec![name(2)]);
+    }
+
+    #[test]
+    fn what_only_the_operator_told_of_is_not_remembered() {
+        let mut memory = Memory::default();
+        memory.learn(&[told(1, 0.0, 0, 0)], &|_| false, 0);
+        assert!(lost(&memory, &[]).is_empty() && memory.of(name(1)).is_none());
+    }
+}
