@@ -5,9 +5,7 @@
 //! The first argument are the seeds; words after it change the pursuit: `noise`, `buildings`,
 //! `uavs=2`, `targets=1`, `wind=0`, `mps=8`, `stand-off=150`, `seconds=300`, `evades`, `drives`,
 //! `stops`; what UAVs do not know or do, `blind` (buildings), `no-map` (streets), `glances` (they
-//! do not search), or know more, `told` (where the targets are); and `each` for a line a run. Prints one JSON object of totals.
-
-mod shared;
+//! do not search), or know more, `told` (where the targets are); and `each` for a line a run. Prints the totals.
 
 use skein_flight::tracking::field::Field;
 use skein_netsim::pursuit::camera::Optics;
@@ -16,22 +14,17 @@ use skein_netsim::pursuit::sensor::Noise;
 use skein_netsim::pursuit::totals::Tally;
 use skein_netsim::pursuit::vehicle::Behaviour;
 use skein_netsim::pursuit::{Knows, Settings, obstacles, run};
-use skein_scenario::town;
+use skein_scenario::{Seeds, town};
 use std::process::ExitCode;
 use std::sync::Arc;
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let seeds = match shared::seeds(args.first().map_or("0..2", String::as_str)) {
-        Ok(seeds) => seeds,
-        Err(code) => return code,
-    };
-    let settings = match settings(&args) {
-        Ok(settings) => settings,
-        Err(problem) => {
-            eprintln!("{problem}");
-            return ExitCode::from(2);
-        }
+    let both = args.first().map_or("0..2", String::as_str).parse::<Seeds>();
+    let (seeds, settings) = match (both, settings(&args)) {
+        (Ok(seeds), Ok(settings)) => (seeds, settings),
+        (Err(problem), _) => return refuse(&problem),
+        (_, Err(problem)) => return refuse(&problem),
     };
     let mut tally = Tally::default();
     for seed in seeds.from..seeds.to {
@@ -46,6 +39,11 @@ fn main() -> ExitCode {
     }
     println!("{:#?}", tally.totals());
     ExitCode::SUCCESS
+}
+
+fn refuse(problem: &dyn core::fmt::Display) -> ExitCode {
+    eprintln!("{problem}");
+    ExitCode::from(2)
 }
 
 /// The pursuit that the words ask for.
