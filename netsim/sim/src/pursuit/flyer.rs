@@ -289,7 +289,8 @@ impl Flyer {
         let lesser = self.searched.iter().filter(|(id, _)| **id < self.id);
         let others: Vec<Point> = lesser.map(|(_, at)| *at).collect();
         let again = self.follows.and_then(|n| self.memory.again(n, now_ms));
-        search.choose(camera, town, (&others, again), now_ms);
+        let expected = self.target().map(|t| t.expected(now_ms, DENSITY));
+        search.choose(camera, town, (&others, again), expected, now_ms);
         self.search = Some(search);
     }
 
@@ -316,7 +317,7 @@ impl Flyer {
         now_ms: u64,
     ) {
         let known = self.target().map(|t| t.motion(now_ms, DENSITY));
-        let searches = self.search.as_ref().and_then(|s| s.motion(now_ms));
+        let searches = self.search.as_ref().and_then(Search::motion);
         let Some(mut motion) = exact.or(searches).or(known) else {
             return self.hold(now_ms);
         };

@@ -32,9 +32,9 @@ const GLANCE_MS: u64 = 600;
 /// Where to fly is chosen so often, milliseconds; over the ground looks are counted then.
 const CHOICE_MS: u64 = 1_000;
 
-/// For so long the UAV flies on with where the target should be, and only its camera searches,
-/// milliseconds.
-const FLIES_ON_MS: u64 = 2_500;
+/// As long as the target is with this chance about where it should be the UAV flies on with that,
+/// and only its camera searches.
+const FLIES_ON: f64 = 0.5;
 
 /// A target that was lost may have gone so far at once, metres, and so fast, m/s.
 const STRAYS_M: f64 = 40.0;
@@ -248,6 +248,8 @@ pub(super) struct Search {
     chosen_ms: u64,
     glance: Option<Point>,
     aim: Option<Point>,
+    /// Whether the target is likely where it should be.
+    flies_on: bool,
 }
 
 impl Search {
@@ -269,6 +271,7 @@ impl Search {
             chosen_ms: 0,
             glance: None,
             aim: None,
+            flies_on: true,
         }
     }
 
@@ -287,14 +290,16 @@ impl Search {
         self.aim
     }
 
-    /// The target as it is flown after: it stands where most is to be looked at.
-    pub(super) fn motion(&self, now_ms: u64) -> Option<TargetMotion> {
-        let flies_on = now_ms < self.last.at_ms + FLIES_ON_MS;
-        self.aim.filter(|_| !flies_on).map(|position| TargetMotion {
-            position,
-            velocity_mps: Vector::zeros(),
-            acceleration_mps2: Vector::zeros(),
-        })
+    /// The target as it is flown after: it stands where most is to be looked at. Nothing while it
+    /// is flown after as it should be.
+    pub(super) fn motion(&self) -> Option<TargetMotion> {
+        self.aim
+            .filter(|_| !self.flies_on)
+            .map(|position| TargetMotion {
+                position,
+                velocity_mps: Vector::zeros(),
+                acceleration_mps2: Vector::zeros(),
+            })
     }
 
     /// The chances at this time, less what these cameras show.
@@ -330,6 +335,7 @@ impl Search {
         camera: &Camera,
         town: &Town<'_>,
         (others, again): (&[Point], Option<Point>),
+        expected: Option<Point>,
         now_ms: u64,
     ) {
         let glances = self.glanced_ms + GLANCE_MS <= now_ms;
@@ -362,6 +368,11 @@ impl Search {
                 reach_m: camera.reach_m(),
             };
             self.aim = fly_to(&places, &looker, self.aim, others).or(self.aim);
+            self.flies_on = expected.is_some_and(|at| {
+                let near = |p: &&(Point, f64)| (p.0 - at).norm() <= looker.reach_m / 2.0;
+                let sum: f64 = places.iter().filter(near).map(|(_, chance)| chance).sum();
+                sum >= FLIES_ON
+            });
         }
     }
 }
