@@ -150,8 +150,17 @@ fn buildings_hide_and_zones_are_kept_clear_of() {
         buildings: Some(Arc::new(obstacles(&houses))),
         ..settings()
     };
-    let t = fly(&hidden, 30..32);
-    assert!(t.hidden_share > 0.02, "{t:?}");
+    let blind = Settings {
+        knows: Knows {
+            buildings: false,
+            ..Knows::default()
+        },
+        ..hidden.clone()
+    };
+    let (t, b) = (fly(&hidden, 30..32), fly(&blind, 30..32));
+    assert!(b.hidden_share > 0.02, "{b:?}");
+    // Who knows of them flies where they do not.
+    assert!(t.hidden_share < b.hidden_share / 2.0, "{t:?} {b:?}");
     let zone = NoFlyZones::new(vec![block(500.0, 500.0), block(900.0, 300.0)]);
     let zoned = Settings {
         zones: Some((zone, 10.0)),
