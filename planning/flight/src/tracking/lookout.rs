@@ -140,7 +140,7 @@ mod tests {
             airspeed_mps: 20.0,
             reach_m: 200.0,
         };
-        let places = [at(150.0, 0.4), at(900.0, 0.6)];
+        let places = [at(150.0, 0.4), at(900.0, 0.8)];
         let fly = |before, others: &[Point]| fly_to(&places, &looker, before, others).unwrap().x;
         assert!((fly(None, &[]) - 150.0).abs() < 1e-9);
         // From here the far one is worth less than seven tenths.
