@@ -281,7 +281,7 @@ impl Flyer {
         };
         let goes_on = self.search.take().filter(|s| s.is_of(&last));
         let mut search = goes_on.unwrap_or_else(|| Search::new(&last, town.streets));
-        let Some(camera) = pictures.iter().find(|_| true) else {
+        let Some(camera) = pictures.first() else {
             return;
         };
         search.look(&pictures, town, now_ms);

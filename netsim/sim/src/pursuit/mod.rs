@@ -92,6 +92,10 @@ const OPERATOR: u16 = 0;
 const CUE_MS: u64 = 2_000;
 
 /// What UAVs know of a town, and what they do with it.
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is one thing to leave out"
+)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Knows {
     /// Its buildings: circles are chosen by them, and ground behind them is not taken as looked
