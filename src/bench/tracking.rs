@@ -26,6 +26,7 @@ const MET_M: f64 = 0.5;
 /// with a camera on a gimbal. With two and more one that follows is taken away on the way.
 /// Exit code 1 if a mode chattered or, without --noise, the stand-off was missed by more than
 /// 0.5 m where it could be flown.
+#[allow(clippy::struct_excessive_bools, reason = "flags of a command line")]
 #[derive(Debug, Args)]
 pub struct TrackingArgs {
     /// The seeds: from A up to but not including B.
