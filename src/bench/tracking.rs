@@ -10,7 +10,7 @@ use skein_netsim::pursuit::roads::Roads;
 use skein_netsim::pursuit::sensor::Noise;
 use skein_netsim::pursuit::totals::Totals;
 use skein_netsim::pursuit::vehicle::Behaviour;
-use skein_netsim::pursuit::{Settings, airframe, obstacles};
+use skein_netsim::pursuit::{Knows, Settings, airframe, obstacles};
 use skein_scenario::{Seeds, town};
 use std::num::NonZeroUsize;
 use std::process::ExitCode;
@@ -26,6 +26,7 @@ const MET_M: f64 = 0.5;
 /// with a camera on a gimbal. With two and more one that follows is taken away on the way.
 /// Exit code 1 if a mode chattered or, without --noise, the stand-off was missed by more than
 /// 0.5 m where it could be flown.
+#[allow(clippy::struct_excessive_bools, reason = "flags of a command line")]
 #[derive(Debug, Args)]
 pub struct TrackingArgs {
     /// The seeds: from A up to but not including B.
@@ -58,6 +59,14 @@ pub struct TrackingArgs {
     /// Buildings hide what is behind them.
     #[arg(long)]
     pub buildings: bool,
+    /// UAVs know neither buildings nor streets, and who lost its target looks round about where it
+    /// should be.
+    #[arg(long)]
+    pub blind: bool,
+    /// UAVs are told where the targets are whether they see them or not: the most that sight can
+    /// come to.
+    #[arg(long)]
+    pub told: bool,
     /// The stand-off, metres.
     #[arg(long, value_name = "M", default_value_t = 150.0, value_parser = stand_off)]
     pub stand_off_m: f64,
@@ -185,6 +194,12 @@ fn settings(args: &TrackingArgs) -> anyhow::Result<Settings> {
         stand_off_m: args.stand_off_m,
         optics,
         noise: args.noise.then(Noise::usual),
+        knows: Knows {
+            buildings: !args.blind,
+            streets: !args.blind,
+            searches: !args.blind,
+            targets: args.told,
+        },
         kill: args.uavs > 1,
         lasts_s: f64::from(args.seconds),
     })
@@ -209,10 +224,11 @@ fn told(t: &Totals) -> String {
         (
             "in sight",
             format!(
-                "{} while it can be kept up with, {} in all; {} behind buildings; longest gap {:.1} s",
+                "{} while it can be kept up with, {} in all; {} behind buildings, below a roof for {}; longest gap {:.1} s",
                 share(t.in_footprint_share),
                 share(t.in_footprint_share_all),
                 share(Some(t.hidden_share)),
+                share(Some(t.covered_share)),
                 t.longest_gap_s
             ),
         ),

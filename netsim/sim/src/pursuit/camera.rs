@@ -5,8 +5,8 @@ use crate::world::obstacles::{Obstacles, Place};
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use skein_flight::airframe::{Airframe, GRAVITY_MPS2};
-use skein_geometry::frame::{Point, Pose};
-use skein_geometry::math::{acos, atan2, cos, sin_cos};
+use skein_geometry::frame::{Point, Pose, Vector};
+use skein_geometry::math::{acos, atan2, cos, sin_cos, tan};
 
 /// A vehicle is seen by its middle, metres above the ground.
 const MIDDLE_M: f64 = 1.0;
@@ -155,6 +155,43 @@ impl Camera {
                 self.axis = turn(turned, attitude.belly, back_rad, attitude.forward);
             }
         }
+    }
+
+    /// As its UAV tells of it, which takes itself to be beside where it is, metres.
+    pub(super) fn told(&self, displaced: Vector) -> Self {
+        let mut told = self.clone();
+        told.at.at += displaced;
+        told
+    }
+
+    /// Where it is over the ground.
+    pub(super) fn at(&self) -> Point {
+        self.at.at
+    }
+
+    /// How far over the ground it recognises a vehicle, metres.
+    pub(super) fn reach_m(&self) -> f64 {
+        let (reach, height) = (self.optics.reach_m, self.at.height_m - MIDDLE_M);
+        (reach * reach - height * height).max(0.0).sqrt()
+    }
+
+    /// How far round a place it shows the ground if it is pointed there, metres; across its line
+    /// of sight, where it shows least.
+    pub(super) fn shows_m(&self, at: Point) -> f64 {
+        self.towards(at).1 * tan(self.optics.half_rad)
+    }
+
+    /// Whether from a place in its height a vehicle at another one is seen past the buildings.
+    pub(super) fn would_see(&self, from: Point, target: Point, obstacles: &Obstacles) -> bool {
+        let from = Place {
+            at: from,
+            height_m: self.at.height_m,
+        };
+        let to = Place {
+            at: target,
+            height_m: MIDDLE_M,
+        };
+        obstacles.sees(from, to)
     }
 
     /// Whether a vehicle at a place is in the picture, large enough and not hidden.

@@ -5,8 +5,9 @@
 //! exactly: then it is the guidance that is measured.
 
 use super::camera::{Attitude, Camera};
+use super::search::{Memory, Search};
 use super::sensor::{Noise, Seen, Sensor};
-use super::{DENSITY, FOLLOWED, LOOK_MS, Settings};
+use super::{DENSITY, FOLLOWED, LOOK_MS, OPERATOR, Settings, Town};
 use crate::world::motion::Kinematic;
 use crate::world::obstacles::Obstacles;
 use skein_behaviors::setpoint::{Setpoint, Side, Steer};
@@ -16,6 +17,7 @@ use skein_flight::tracking::fusion::{Board, Fused, Register};
 use skein_flight::tracking::handover::{Wanted, Watch, assign};
 use skein_flight::tracking::mode::{Airspeeds, Mode};
 use skein_flight::tracking::tracks::{TargetName, Tracks};
+use skein_flight::tracking::vantage::{Vantage, View};
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::{seconds, sin_cos};
@@ -36,6 +38,10 @@ pub(super) struct Statement {
     pub(super) author: u16,
     pub(super) watch: Watch,
     pub(super) registers: Vec<Register>,
+    /// What it looks at.
+    pub(super) camera: Camera,
+    /// Where it flies to, while it searches.
+    pub(super) searches: Option<Point>,
 }
 
 /// A UAV.
@@ -54,6 +60,15 @@ pub(super) struct Flyer {
     last: Option<Command>,
     switches: u32,
     noise: Option<Noise>,
+    vantage: Vantage,
+    /// From the target to the middle of its circle, metres.
+    beside: Vector,
+    memory: Memory,
+    /// The search for what it follows, while that is out of sight.
+    search: Option<Search>,
+    /// What the cameras of all looked at since it decided last, and where others search.
+    pictures: Vec<Camera>,
+    searched: BTreeMap<u16, Point>,
 }
 
 impl Flyer {
@@ -74,6 +89,12 @@ impl Flyer {
             last: None,
             switches: 0,
             noise,
+            vantage: Vantage::default(),
+            beside: Vector::zeros(),
+            memory: Memory::default(),
+            search: None,
+            pictures: Vec::new(),
+            searched: BTreeMap::new(),
         }
     }
 
@@ -109,8 +130,13 @@ impl Flyer {
         self.switches + self.follower.as_ref().map_or(0, |f| f.switch().changes())
     }
 
-    /// The camera turns while it flies.
-    pub(super) fn turn_camera(&mut self, over_s: f64, now_ms: u64) {
+    /// Whether the middle of its circle is aside of the target.
+    pub(super) fn is_aside(&self) -> bool {
+        self.beside != Vector::zeros()
+    }
+
+    /// The camera turns while it flies; `told` is where the target is, if that is known.
+    pub(super) fn turn_camera(&mut self, over_s: f64, told: Option<Point>, now_ms: u64) {
         let pose = self.body.pose();
         let airspeed_mps = self
             .last
@@ -121,9 +147,12 @@ impl Flyer {
             airspeed_mps,
             self.turn_rate_radps,
         );
-        let aim = self
+        let displaced = self.sensor.displaced();
+        let glances = self
             .target()
-            .map(|t| t.expected(now_ms, DENSITY) + searched(t, now_ms) - self.sensor.displaced());
+            .map(|t| t.expected(now_ms, DENSITY) + searched(t, now_ms));
+        let searches = self.search.as_ref().and_then(Search::glance);
+        let aim = told.or_else(|| searches.or(glances).map(|p| p - displaced));
         self.camera
             .advance(&pose, self.body.height_m(), &attitude, aim, over_s);
     }
@@ -173,10 +202,14 @@ impl Flyer {
                 registers.push(r);
             }
         }
+        let camera = self.camera.told(self.sensor.displaced());
+        self.pictures.push(camera.clone());
         Statement {
             author: self.id,
             watch: self.watch(now_ms),
             registers,
+            camera,
+            searches: self.search.as_ref().and_then(Search::aim),
         }
     }
 
@@ -187,17 +220,24 @@ impl Flyer {
         for r in &statement.registers {
             self.board.put(*r);
         }
+        self.pictures.push(statement.camera.clone());
+        match statement.searches {
+            Some(aim) => self.searched.insert(statement.author, aim),
+            None => self.searched.remove(&statement.author),
+        };
     }
 
     /// Decides what it follows, by what all have told.
-    pub(super) fn decide(&mut self, now_ms: u64) {
+    pub(super) fn decide(&mut self, town: &Town<'_>, now_ms: u64) {
         self.heard.retain(|_, (at, _)| *at + GONE_MS >= now_ms);
+        let heard = &self.heard;
+        self.searched.retain(|id, _| heard.contains_key(id));
         let fused = self.board.fused(now_ms, DENSITY);
         self.targets = fused.into_iter().filter(|t| t.kind == FOLLOWED).collect();
         let mut watches: BTreeMap<u16, Watch> =
             self.heard.iter().map(|(id, (_, w))| (*id, *w)).collect();
         watches.insert(self.id, self.watch(now_ms));
-        let wanted: Vec<Wanted> = self
+        let mut wanted: Vec<Wanted> = self
             .targets
             .iter()
             .map(|t| Wanted {
@@ -205,6 +245,18 @@ impl Flyer {
                 at: t.estimate.position(),
             })
             .collect();
+        if town.searches {
+            let board = &self.board;
+            let is_seen = |name: TargetName| {
+                let mut told = board.registers().filter(|r| r.name == name);
+                told.any(|r| r.author != OPERATOR)
+            };
+            self.memory.learn(&self.targets, &is_seen, now_ms);
+            // Who is lost is looked for by those who are left when all others are followed.
+            let spare = watches.len().saturating_sub(wanted.len());
+            let lost = self.memory.lost(&self.targets);
+            wanted.extend(lost.into_iter().take(spare));
+        }
         let follows = assign(&watches, &wanted).follows.get(&self.id).copied();
         if follows.is_some() {
             // One target under another name is still the same.
@@ -215,6 +267,31 @@ impl Flyer {
             }
             self.follows = follows;
         }
+        self.search(town, now_ms);
+    }
+
+    /// What it does about a target that is out of sight.
+    fn search(&mut self, town: &Town<'_>, now_ms: u64) {
+        let pictures = core::mem::take(&mut self.pictures);
+        let known = self.follows.and_then(|name| self.memory.of(name));
+        let last = known.filter(|l| town.searches && l.at_ms + SEARCH_MS <= now_ms);
+        let Some(last) = last else {
+            self.search = None;
+            return;
+        };
+        let goes_on = self.search.take().filter(|s| s.is_of(&last));
+        let mut search = goes_on.unwrap_or_else(|| Search::new(&last, town.streets));
+        let Some(camera) = pictures.first() else {
+            return;
+        };
+        search.look(&pictures, town, now_ms);
+        // Of two the one of the lesser number goes where both would.
+        let lesser = self.searched.iter().filter(|(id, _)| **id < self.id);
+        let others: Vec<Point> = lesser.map(|(_, at)| *at).collect();
+        let again = self.follows.and_then(|n| self.memory.again(n, now_ms));
+        let expected = self.target().map(|t| t.expected(now_ms, DENSITY));
+        search.choose(camera, town, (&others, again), expected, now_ms);
+        self.search = Some(search);
     }
 
     /// How far apart what it follows and what it is to follow are, metres.
@@ -235,12 +312,13 @@ impl Flyer {
         &mut self,
         settings: &Settings,
         wind: Wind,
+        (town, guard): (&Town<'_>, Option<&Guard<'_>>),
         exact: Option<TargetMotion>,
-        guard: Option<&Guard<'_>>,
         now_ms: u64,
     ) {
         let known = self.target().map(|t| t.motion(now_ms, DENSITY));
-        let Some(motion) = exact.or(known) else {
+        let searches = self.search.as_ref().and_then(Search::motion);
+        let Some(mut motion) = exact.or(searches).or(known) else {
             return self.hold(now_ms);
         };
         let pose = self.body.pose();
@@ -259,6 +337,20 @@ impl Flyer {
         let mut own = pose;
         own.east_m += self.sensor.displaced().x;
         own.north_m += self.sensor.displaced().y;
+        if let Some(buildings) = town.buildings {
+            let camera = &self.camera;
+            let view = View {
+                sees: &|from, at| camera.would_see(from, at, buildings),
+                reach_m: camera.reach_m(),
+                streets: town.streets,
+            };
+            let circle = self
+                .vantage
+                .choose(follower, (own, wind), &motion, &view, now_ms);
+            follower.circle(circle.map(|c| c.radius_m));
+            self.beside = circle.map_or_else(Vector::zeros, |c| c.beside);
+            motion.position += self.beside;
+        }
         let commands = follower.commands(own, wind, &motion, seconds(LOOK_MS), guard);
         self.fly(&commands, now_ms);
     }
@@ -325,6 +417,9 @@ impl Flyer {
         self.targets.iter().find(|t| Some(t.name) == self.follows)
     }
 }
+
+/// For so long nobody may see a target before it is searched for, milliseconds.
+const SEARCH_MS: u64 = 1_200;
 
 /// For so long nobody may see a target before it is looked for beside where it should be,
 /// seconds.

@@ -50,6 +50,8 @@ pub(super) struct Look<'a> {
     pub(super) command: Option<&'a Command>,
     pub(super) mode: Option<Mode>,
     pub(super) target: Option<&'a Fused>,
+    /// Whether the middle of its circle is aside of the target.
+    pub(super) is_aside: bool,
     /// Of each vehicle that is to be followed: whether the camera has it.
     pub(super) sees: Vec<bool>,
     /// Of each: whether it would be in the picture if no building stood there.
@@ -150,7 +152,7 @@ impl Judge {
             return;
         };
         let as_asked = match c.flown {
-            Flown::Orbit(r) => (r - self.stand_off_m).abs() < 1e-6,
+            Flown::Orbit(r) => (r - self.stand_off_m).abs() < 1e-6 && !l.is_aside,
             Flown::Weave(_) | Flown::Approach | Flown::Outrun => false,
         };
         let flyable = as_asked && self.is_flyable(l, c.airspeed_mps, t);
@@ -247,6 +249,7 @@ impl Judge {
         self.out.whole_s += step_s;
         self.out.seen_s += if seen { step_s } else { 0.0 };
         self.out.hidden_s += if framed && !seen { step_s } else { 0.0 };
+        self.out.covered_s += if t.is_covered { step_s } else { 0.0 };
         let keeps = self.drift_mps(t) * KEEPS <= fastest_mps;
         self.kept_since_s[i] = if keeps {
             self.kept_since_s[i].or(Some(now_s))

@@ -11,6 +11,7 @@
 //! | [`camera`] | what is in the picture, and what is hidden |
 //! | [`sensor`] | detections with errors, misses and false alarms |
 //! | `flyer` | one UAV: percept in, setpoint and statement out |
+//! | `search` | what it does about a target that it lost |
 //! | `judge` | what it came to |
 //! | [`totals`] | what many runs come to |
 
@@ -18,6 +19,7 @@ pub mod camera;
 mod flyer;
 mod judge;
 pub mod roads;
+mod search;
 pub mod sensor;
 #[cfg(test)]
 mod tests;
@@ -26,7 +28,7 @@ pub mod vehicle;
 
 use crate::spec::Building;
 use crate::world::motion::Kinematic;
-use crate::world::obstacles::Obstacles;
+use crate::world::obstacles::{Obstacles, Place};
 use camera::Optics;
 use flyer::{Flyer, Statement};
 use judge::{Judge, Look};
@@ -41,6 +43,7 @@ use skein_flight::tracking::field::Field;
 use skein_flight::tracking::follower::TargetMotion;
 use skein_flight::tracking::fusion::Register;
 use skein_flight::tracking::mode::Airspeeds;
+use skein_flight::tracking::streets::Streets;
 use skein_flight::tracking::tracks::{Kind, TargetName};
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::NoFlyZones;
@@ -88,6 +91,43 @@ const OPERATOR: u16 = 0;
 /// It tells of what nobody has seen yet so often, milliseconds.
 const CUE_MS: u64 = 2_000;
 
+/// What UAVs know of a town, and what they do with it.
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is one thing to leave out"
+)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Knows {
+    /// Its buildings: circles are chosen by them, and ground behind them is not taken as looked
+    /// at.
+    pub buildings: bool,
+    /// Its streets: targets are expected on them.
+    pub streets: bool,
+    /// Who lost its target searches for it; else it looks round about where that should be.
+    pub searches: bool,
+    /// Where the targets are, whether they are seen or not: the most that sight can come to.
+    pub targets: bool,
+}
+
+impl Default for Knows {
+    fn default() -> Self {
+        Self {
+            buildings: true,
+            streets: true,
+            searches: true,
+            targets: false,
+        }
+    }
+}
+
+/// What of a town a UAV knows.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Town<'a> {
+    buildings: Option<&'a Obstacles>,
+    streets: Option<&'a Streets>,
+    searches: bool,
+}
+
 /// A pursuit, but for its seed.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -117,6 +157,8 @@ pub struct Settings {
     pub optics: Optics,
     /// Errors of sensors; without any, UAVs know exactly what they see.
     pub noise: Option<Noise>,
+    /// What UAVs know of the town.
+    pub knows: Knows,
     /// Whether one that follows is taken away on the way.
     pub kill: bool,
     /// How long it lasts, seconds.
@@ -127,6 +169,8 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Truth {
     motion: TargetMotion,
+    /// Whether it is below a roof, where nobody sees it.
+    is_covered: bool,
 }
 
 /// The fixed wing of the published comparisons: cruise 20 m/s, 30° of bank.
@@ -155,6 +199,8 @@ pub fn obstacles(buildings: &[Building]) -> Obstacles {
 /// All that moves.
 struct World<'a> {
     settings: &'a Settings,
+    /// Its streets as UAVs know them.
+    streets: Option<Streets>,
     wind: Wind,
     vehicles: Vec<Vehicle>,
     /// Parked ones of other kinds.
@@ -236,6 +282,11 @@ impl<'a> World<'a> {
         }
         Self {
             settings,
+            streets: settings
+                .knows
+                .streets
+                .then(|| Streets::of(&settings.roads.lines()))
+                .flatten(),
             wind,
             judge: Judge::new(settings.stand_off_m, wind, vehicles.len()),
             vehicles,
@@ -260,6 +311,16 @@ impl<'a> World<'a> {
         for v in &mut self.vehicles {
             v.drive(&self.settings.roads, seconds(now_ms), &uavs);
         }
+    }
+
+    /// Where a target is, as one that knows it would say: UAVs take turns.
+    fn told(&self, f: &Flyer) -> Option<TargetMotion> {
+        let count = self.vehicles.len();
+        if !self.settings.knows.targets || count == 0 {
+            return None;
+        }
+        let nth = usize::from(f.id.saturating_sub(1)) % count;
+        Some(self.truth()[nth].motion)
     }
 
     fn obstacles(&self) -> Option<&'a Obstacles> {
@@ -294,25 +355,36 @@ impl<'a> World<'a> {
             }
         }
         let truth = self.truth();
+        let knows = self.settings.knows;
+        let town = Town {
+            buildings: obstacles.filter(|_| knows.buildings),
+            streets: self.streets.as_ref(),
+            searches: knows.searches,
+        };
         for f in &mut self.flyers {
-            f.decide(now_ms);
+            f.decide(&town, now_ms);
         }
         for f in &self.flyers {
             let own: Vec<Register> = f.registers().copied().collect();
             self.judge.consistency(now_ms, &truth, &own, f.targets());
         }
-        let exact: Vec<Option<TargetMotion>> = if self.settings.noise.is_some() {
-            vec![None; self.flyers.len()]
-        } else {
-            self.flyers.iter().map(|f| self.exact(f, &truth)).collect()
-        };
+        let is_exact = self.settings.noise.is_none();
+        let exact: Vec<Option<TargetMotion>> = self
+            .flyers
+            .iter()
+            .map(|f| {
+                let seen = || self.exact(f, &truth).filter(|_| is_exact);
+                self.told(f).or_else(seen)
+            })
+            .collect();
         let zones = self.settings.zones.as_ref();
         let guard = zones.map(|(zones, clearance_m)| Guard {
             zones,
             clearance_m: *clearance_m,
         });
         for (f, exact) in self.flyers.iter_mut().zip(exact) {
-            f.steer(self.settings, self.wind, exact, guard.as_ref(), now_ms);
+            let settings = self.settings;
+            f.steer(settings, self.wind, (&town, guard.as_ref()), exact, now_ms);
         }
     }
 
@@ -329,9 +401,14 @@ impl<'a> World<'a> {
     fn fly(&mut self, now_ms: u64) {
         let (then_ms, step_s) = (now_ms + STEP_MS, seconds(STEP_MS));
         let mut flown = Vec::new();
-        for f in &mut self.flyers {
+        let told: Vec<Option<Point>> = self
+            .flyers
+            .iter()
+            .map(|f| self.told(f).map(|m| m.position))
+            .collect();
+        for (f, told) in self.flyers.iter_mut().zip(told) {
             f.body.advance(then_ms, &mut flown);
-            f.turn_camera(step_s, then_ms);
+            f.turn_camera(step_s, told, then_ms);
         }
         let truth = self.truth();
         let obstacles = self.obstacles();
@@ -345,6 +422,7 @@ impl<'a> World<'a> {
                 command: f.last(),
                 mode: f.mode(),
                 target: f.target(),
+                is_aside: f.is_aside(),
                 sees: truth
                     .iter()
                     .map(|t| f.camera.sees(t.motion.position, obstacles))
@@ -373,6 +451,7 @@ impl<'a> World<'a> {
                     velocity_mps: v.velocity_mps(),
                     acceleration_mps2: v.acceleration_mps2(),
                 },
+                is_covered: self.obstacles().is_some_and(|o| is_covered(v.at, o)),
             })
             .collect()
     }
@@ -393,6 +472,13 @@ impl<'a> World<'a> {
         }
         found.is_some()
     }
+}
+
+/// Whether a place is below a roof.
+fn is_covered(at: Point, obstacles: &Obstacles) -> bool {
+    const ABOVE_M: f64 = 1_000.0;
+    let place = |height_m| Place { at, height_m };
+    !obstacles.sees(place(0.0), place(ABOVE_M))
 }
 
 /// What an operator tells of the targets that nobody has seen yet: where they are, roughly.

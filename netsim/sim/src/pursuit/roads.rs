@@ -57,6 +57,16 @@ impl Roads {
         self.places.is_empty()
     }
 
+    /// Its streets as lines of two points.
+    #[must_use]
+    pub fn lines(&self) -> Vec<Vec<Point>> {
+        let of = |a: usize| {
+            let ahead = self.neighbours[a].iter().filter(move |b| a < **b);
+            ahead.map(move |b| vec![self.places[a], self.places[*b]])
+        };
+        (0..self.places.len()).flat_map(of).collect()
+    }
+
     /// A place by its number.
     pub(super) fn place(&self, n: usize) -> Point {
         self.places[n]

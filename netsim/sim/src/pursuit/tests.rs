@@ -21,6 +21,7 @@ fn settings() -> Settings {
         stand_off_m: 150.0,
         optics: Optics::gimballed(),
         noise: None,
+        knows: Knows::default(),
         kill: false,
         lasts_s: 240.0,
     }
@@ -79,27 +80,87 @@ fn who_is_taken_away_is_relieved() {
     assert!(t.reacquired_worst_s.is_some(), "{t:?}");
 }
 
+fn block(x: f64, y: f64) -> Polygon {
+    let corners = [(x, y), (x + 80.0, y), (x + 80.0, y + 80.0), (x, y + 80.0)];
+    Polygon::new(corners.map(|(x, y)| Point::new(x, y)).to_vec()).unwrap()
+}
+
+/// A house in each square of the streets.
+fn houses(height_m: f64) -> Vec<Building> {
+    let all = (0..8).flat_map(|i| (0..8).map(move |k| (f64::from(i), f64::from(k))));
+    all.map(|(i, k)| Building {
+        footprint: block(i * 180.0 + 50.0, k * 180.0 + 50.0),
+        height_m,
+    })
+    .collect()
+}
+
+#[test]
+fn who_knows_houses_and_streets_sees_more_and_most_who_is_told() {
+    let nothing = Knows {
+        buildings: false,
+        streets: false,
+        searches: false,
+        targets: false,
+    };
+    let told = Knows {
+        targets: true,
+        ..Knows::default()
+    };
+    let seen = |knows| {
+        let s = Settings {
+            buildings: Some(Arc::new(obstacles(&houses(70.0)))),
+            noise: Some(Noise::usual()),
+            uavs: 1,
+            knows,
+            ..settings()
+        };
+        fly(&s, 50..56).in_footprint_share_all.unwrap()
+    };
+    let (blind, knows, told) = (seen(nothing), seen(Knows::default()), seen(told));
+    assert!(knows > blind + 0.03, "{blind} {knows} {told}");
+    assert!(told > knows - 0.01, "{blind} {knows} {told}");
+}
+
+#[test]
+fn who_searches_finds_without_a_map_too() {
+    let seen = |searches| {
+        let knows = Knows {
+            streets: false,
+            searches,
+            ..Knows::default()
+        };
+        let s = Settings {
+            noise: Some(Noise::usual()),
+            target_mps: 18.0,
+            uavs: 1,
+            knows,
+            ..settings()
+        };
+        fly(&s, 60..66).in_footprint_share_all.unwrap()
+    };
+    let (glances, searches) = (seen(false), seen(true));
+    assert!(searches > glances, "{glances} {searches}");
+}
+
 #[test]
 fn buildings_hide_and_zones_are_kept_clear_of() {
-    let block = |x: f64, y: f64| {
-        let corners = [(x, y), (x + 80.0, y), (x + 80.0, y + 80.0), (x, y + 80.0)];
-        Polygon::new(corners.map(|(x, y)| Point::new(x, y)).to_vec()).unwrap()
-    };
-    let houses: Vec<Building> = (0..8)
-        .flat_map(|i| {
-            (0..8).map(move |k| (f64::from(i) * 180.0 + 50.0, f64::from(k) * 180.0 + 50.0))
-        })
-        .map(|(x, y)| Building {
-            footprint: block(x, y),
-            height_m: 60.0,
-        })
-        .collect();
+    let houses = houses(60.0);
     let hidden = Settings {
         buildings: Some(Arc::new(obstacles(&houses))),
         ..settings()
     };
-    let t = fly(&hidden, 30..32);
-    assert!(t.hidden_share > 0.02, "{t:?}");
+    let blind = Settings {
+        knows: Knows {
+            buildings: false,
+            ..Knows::default()
+        },
+        ..hidden.clone()
+    };
+    let (t, b) = (fly(&hidden, 30..32), fly(&blind, 30..32));
+    assert!(b.hidden_share > 0.02, "{b:?}");
+    // Who knows of them flies where they do not.
+    assert!(t.hidden_share < b.hidden_share / 2.0, "{t:?} {b:?}");
     let zone = NoFlyZones::new(vec![block(500.0, 500.0), block(900.0, 300.0)]);
     let zoned = Settings {
         zones: Some((zone, 10.0)),

@@ -21,6 +21,8 @@ pub struct Pursuit {
     pub seen_s: f64,
     /// Of it, in the picture but behind a building, seconds.
     pub hidden_s: f64,
+    /// Of it, below a roof, where nobody could see it, seconds.
+    pub covered_s: f64,
     /// Of it, while it could be kept up with, seconds.
     pub kept_s: f64,
     /// Of that, with a UAV that sees it, seconds.
@@ -65,6 +67,8 @@ pub struct Totals {
     pub in_footprint_share_all: Option<f64>,
     /// The share of time with a target in the picture but behind a building.
     pub hidden_share: f64,
+    /// The share of time that a target is below a roof, where nobody could see it.
+    pub covered_share: f64,
     /// The longest time that nobody saw a target, seconds.
     pub longest_gap_s: f64,
     /// Changes between loiter and weave.
@@ -138,6 +142,7 @@ impl Tally {
             in_footprint_share: ratio(sum(&|r| r.kept_seen_s), sum(&|r| r.kept_s)),
             in_footprint_share_all: ratio(sum(&|r| r.seen_s), whole_s),
             hidden_share: ratio(sum(&|r| r.hidden_s), whole_s).unwrap_or(0.0),
+            covered_share: ratio(sum(&|r| r.covered_s), whole_s).unwrap_or(0.0),
             longest_gap_s: most(&|r| r.longest_gap_s),
             mode_switches: count(&|r| r.mode_switches),
             chatter: count(&|r| r.chatter),

@@ -85,6 +85,9 @@ const AROUND: usize = 2;
 const PATIENCE: f64 = 1.5;
 const PATIENCE_S: f64 = 15.0;
 
+/// A chance below this is none.
+const NOTHING: f64 = 1e-6;
+
 /// Where a target may be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChanceMap {
@@ -351,6 +354,13 @@ impl ChanceMap {
         let squares = 0..SIDE * SIDE;
         let near = squares.filter(|s| (self.middle(*s) - at).norm() <= radius_m);
         near.map(|s| self.of_square(s)).sum()
+    }
+
+    /// All places where it may be, with their chances: the middles of squares.
+    #[must_use]
+    pub fn places(&self) -> Vec<(Point, f64)> {
+        let all = (0..SIDE * SIDE).map(|s| (self.middle(s), self.of_square(s)));
+        all.filter(|(_, chance)| *chance > NOTHING).collect()
     }
 
     /// Sums of all squares south and west of each corner.

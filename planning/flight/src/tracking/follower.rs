@@ -164,6 +164,8 @@ pub struct Follower {
     phase_rad: f64,
     airspeed_mps: f64,
     approaches: bool,
+    /// The radius of its circles instead of the stand-off, metres.
+    circle_m: Option<f64>,
 }
 
 /// What one step is to do before it is limited.
@@ -193,7 +195,14 @@ impl Follower {
             phase_rad: 0.0,
             airspeed_mps: settings.airspeeds.least_mps,
             approaches: true,
+            circle_m: None,
         }
+    }
+
+    /// From now on circles have this radius, metres, or that of the stand-off; what cannot be
+    /// flown is flown wider. Whether it circles or weaves goes by the stand-off all the same.
+    pub fn circle(&mut self, radius_m: Option<f64>) {
+        self.circle_m = radius_m;
     }
 
     /// What it was told to do.
@@ -218,21 +227,13 @@ impl Follower {
         period_s: f64,
         guard: Option<&Guard<'_>>,
     ) -> Vec<Command> {
-        let drift_mps = (target.velocity_mps - wind.velocity()).norm();
-        let s = &self.settings;
-        let (mode, prospect) = self.switch.update(
-            &s.airframe,
-            &s.airspeeds,
-            drift_mps,
-            s.stand_off.radius_m(),
-            period_s,
-        );
+        let (mode, prospect) = self.prospect(wind, target, period_s);
         let around = |own: &mut Self, horizon_s: f64| {
             let steps = (horizon_s / STEP_S).round().clamp(1.0, 1_000.0);
             let (mut at, mut done, mut commands) = (pose, 0.0, Vec::new());
             while done < steps {
                 let then = target.after(done * STEP_S);
-                let command = own.step(&at, wind, &then, mode, prospect);
+                let command = own.step(&at, wind, &then, (mode, prospect), STEP_S);
                 at = fly(&at, &command, wind);
                 commands.push(command);
                 done += 1.0;
@@ -259,13 +260,48 @@ impl Follower {
         }
     }
 
+    /// Where it would be after each of so many steps of `step_s` seconds, if the target moved so,
+    /// by a copy of it; no zones are looked at.
+    #[must_use]
+    pub fn ahead(&self, pose: Pose, wind: Wind, step_s: f64, moves: &[TargetMotion]) -> Vec<Pose> {
+        let mut own = self.clone();
+        let Some(first) = moves.first() else {
+            return Vec::new();
+        };
+        let how = own.prospect(wind, first, 0.0);
+        let mut at = pose;
+        let each = moves.iter().map(|target| {
+            let command = own.step(&at, wind, target, how, step_s);
+            at = fly(&at, &command, wind);
+            at
+        });
+        each.collect()
+    }
+
+    /// The mode, and what it comes to, after `period_s` seconds of a target that moves so.
+    fn prospect(&mut self, wind: Wind, target: &TargetMotion, period_s: f64) -> (Mode, Prospect) {
+        let drift_mps = (target.velocity_mps - wind.velocity()).norm();
+        let s = &self.settings;
+        let (mode, mut prospect) = self.switch.update(
+            &s.airframe,
+            &s.airspeeds,
+            drift_mps,
+            s.stand_off.radius_m(),
+            period_s,
+        );
+        if let Some(circle_m) = self.circle_m {
+            prospect.loiter_m = prospect.least_radius_m.map(|m| m.max(circle_m));
+        }
+        (mode, prospect)
+    }
+
     fn step(
         &mut self,
         pose: &Pose,
         wind: Wind,
         target: &TargetMotion,
-        mode: Mode,
-        prospect: Prospect,
+        (mode, prospect): (Mode, Prospect),
+        step_s: f64,
     ) -> Command {
         let scene = Scene {
             pose,
@@ -278,15 +314,16 @@ impl Follower {
         };
         let wanted = match mode {
             Mode::Loiter => self.loiter(&scene),
-            Mode::Weave => self.weave(&scene),
+            Mode::Weave => self.weave(&scene, step_s),
         };
         let off_rad = wrap_pi(wanted.nose.heading_rad - pose.heading_rad);
         let most = turn_rate_radps(&self.settings.airframe, wanted.airspeed_mps);
-        let asked = wanted.nose.rate_radps + HEADING_GAIN * off_rad;
+        let gain = HEADING_GAIN.min(1.0 / step_s);
+        let asked = wanted.nose.rate_radps + gain * off_rad;
         // Who is told no number about its target circles where it is.
         let asked = if asked.is_finite() { asked } else { most };
         Command {
-            lasts_s: STEP_S,
+            lasts_s: step_s,
             airspeed_mps: wanted.airspeed_mps,
             turn_rate_radps: asked.clamp(-most, most),
             flown: wanted.flown,
@@ -326,7 +363,7 @@ impl Follower {
     }
 
     /// Along with the target, or on the way to it.
-    fn weave(&mut self, scene: &Scene<'_>) -> Wanted {
+    fn weave(&mut self, scene: &Scene<'_>, step_s: f64) -> Wanted {
         let drift = scene.drift.velocity_mps;
         let drift_mps = drift.norm();
         let far_m = scene.prospect.weave_m.unwrap_or(0.0);
@@ -362,7 +399,7 @@ impl Follower {
         let speeds = self.settings.airspeeds;
         let (beside_rad, turning, line_m) = weave.at(self.phase_rad);
         let phase_rate = weave.phase_rate_radps(self.phase_rad, airspeed_mps);
-        self.phase_rad = (self.phase_rad + phase_rate * STEP_S) % TAU;
+        self.phase_rad = (self.phase_rad + phase_rate * step_s) % TAU;
         let back_rad = ((line_m - beside_m) / BESIDE_M).clamp(-BESIDE_MOST_RAD, BESIDE_MOST_RAD);
         let veer_radps = scene.drift.acceleration_mps2.dot(&left) / drift_mps;
         self.airspeed_mps = airspeed_mps;

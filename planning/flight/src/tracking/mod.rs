@@ -15,6 +15,9 @@
 //! | [`tracks`] | several targets, false alarms, targets lost and found | 3.7 |
 //! | [`told`] | estimates in few numbers, for the radio | 3.7 |
 //! | [`chance`] | where a target that is out of sight may be, and where to look for it | 3.7 |
+//! | [`streets`] | where it is if it keeps to streets that are known | 3.7 |
+//! | [`vantage`] | the circle from which buildings hide it least | 3.7.1 |
+//! | [`lookout`] | where to point a camera, and where to fly, by chances | 3.7 |
 //! | [`fusion`] | what all UAVs know of a target together | 3.7 |
 //! | [`handover`] | who follows which target | 3.7 |
 //!
@@ -30,10 +33,13 @@ pub mod flyable;
 pub mod follower;
 pub mod fusion;
 pub mod handover;
+pub mod lookout;
 pub mod mode;
 pub mod orbit;
+pub mod streets;
 pub mod told;
 pub mod tracks;
+pub mod vantage;
 pub mod weave;
 
 pub use field::{Field, Turn};
