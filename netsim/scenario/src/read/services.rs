@@ -81,7 +81,7 @@ mod tests {
     use crate::read::testing::default_with;
 
     fn with(services: &str) -> Result<crate::Scenario, String> {
-        default_with(&format!("services: {services},"))
+        default_with("services", services)
     }
 
     #[test]

@@ -221,15 +221,11 @@ fn of_file(
 
 #[cfg(test)]
 mod tests {
-    use crate::Overrides;
+    use crate::read::testing::default_with;
 
     /// The default scenario with these vehicles.
     fn with(vehicles: &str) -> Result<crate::Scenario, String> {
-        let text = include_str!("../../../../configs/trials/helsinki.json5");
-        let text = text.replacen("vehicles: [],", &format!("vehicles: {vehicles},"), 1);
-        let files = crate::builtin::files();
-        crate::parse_with("s.json5", &text, &files, &Overrides::default())
-            .map_err(|e| e.to_string())
+        default_with("vehicles", vehicles)
     }
 
     #[test]
