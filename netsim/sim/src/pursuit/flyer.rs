@@ -418,19 +418,16 @@ impl Flyer {
     }
 }
 
-/// For so long nobody may see a target before it is searched for, milliseconds.
+/// For so long nobody may see a target before it is searched for, or looked for beside where it
+/// should be, milliseconds.
 const SEARCH_MS: u64 = 1_200;
-
-/// For so long nobody may see a target before it is looked for beside where it should be,
-/// seconds.
-const SEARCH_S: f64 = 1.2;
 
 /// The camera looks elsewhere so often, milliseconds.
 const GLANCE_MS: u64 = 400;
 
 /// Where the camera looks beside that: round about, as far as the target may have come.
 fn searched(t: &Fused, now_ms: u64) -> Vector {
-    if t.unseen_s(now_ms) < SEARCH_S {
+    if t.unseen_s(now_ms) < seconds(SEARCH_MS) {
         return Vector::zeros();
     }
     let glance = now_ms / GLANCE_MS;

@@ -14,7 +14,6 @@ use super::{Known, Tasking};
 use crate::effect::{Effect, Effects};
 use crate::input::Time;
 use crate::mission::mm;
-use crate::output::TaskNews;
 use crate::wire::codec::Body;
 use crate::wire::detection::DETECTIONS_MAX;
 use crate::wire::limits::DURATION_MAX_MS;
@@ -137,8 +136,7 @@ impl Tasking {
         let served: Vec<_> = served.collect();
         let mut effects = Effects::new();
         for (id, task) in served {
-            effects.push(super::report(id, &task, TaskNews::Over(TaskState::Done)));
-            self.learn(now, id, task.clone());
+            effects.extend(self.learn(now, id, task.clone()));
             effects.push(Effect::Speak(id.number, Body::Task(task)));
         }
         effects
