@@ -18,10 +18,10 @@
 //! | circle that is flown | best of the others | next |
 //! |---|---|---|
 //! | – | – | that of the stand-off |
-//! | any | better by [`BETTER`] | that one |
+//! | any | better by `BETTER` | that one |
 //! | any | otherwise | it stays |
 //!
-//! Circles that are not the stand-off's cost a little ([`OTHER`], [`ASIDE`]), more than it takes
+//! Circles that are not the stand-off's cost a little (`OTHER`, `ASIDE`), more than it takes
 //! to change, so that where nothing hides the target the stand-off is flown again.
 //!
 //! # Guarantees
@@ -30,7 +30,7 @@
 //!
 //! # Complexity
 //! Once in [`EACH_MS`] [`RADII`] · [`PLACES`] circles of [`STEPS`] steps of the law, and
-//! [`SAMPLES`] lines of sight for each way that the target may drive.
+//! `SAMPLES` lines of sight for each way that the target may drive.
 
 use super::flyable::least_radius_m;
 use super::follower::{Follower, StandOff, TargetMotion};
