@@ -7,13 +7,11 @@
 //! `stops`; what UAVs do not know or do, `blind` (buildings), `no-map` (streets), `glances` (they
 //! do not search), or know more, `told` (where the targets are); and `each` for a line a run. Prints the totals.
 
-use skein_flight::tracking::field::Field;
-use skein_netsim::pursuit::camera::Optics;
 use skein_netsim::pursuit::roads::Roads;
 use skein_netsim::pursuit::sensor::Noise;
 use skein_netsim::pursuit::totals::Tally;
 use skein_netsim::pursuit::vehicle::Behaviour;
-use skein_netsim::pursuit::{Knows, Settings, obstacles, run};
+use skein_netsim::pursuit::{Settings, obstacles, run};
 use skein_scenario::{Seeds, town};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -50,24 +48,7 @@ fn refuse(problem: &dyn core::fmt::Display) -> ExitCode {
 fn settings(args: &[String]) -> Result<Settings, String> {
     let town = town::helsinki().map_err(|e| e.to_string())?;
     let roads = Roads::of(&town.roads).ok_or("the town has no streets")?;
-    let mut s = Settings {
-        roads,
-        buildings: None,
-        zones: None,
-        uavs: 2,
-        targets: 1,
-        wind_mps: 0.0,
-        target_mps: 8.0,
-        behaviour: None,
-        field: Field::HOPF,
-        airspeeds: None,
-        stand_off_m: 150.0,
-        optics: Optics::gimballed(),
-        noise: None,
-        knows: Knows::default(),
-        kill: false,
-        lasts_s: 300.0,
-    };
+    let mut s = Settings::on(roads);
     for word in args.iter().skip(1) {
         let (name, value) = word.split_once('=').unwrap_or((word, ""));
         let number = || {

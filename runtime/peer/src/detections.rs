@@ -289,6 +289,11 @@ impl Detections {
         self.known.iter().map(|(id, (d, _))| (*id, d))
     }
 
+    /// What was told in a register.
+    pub fn get(&self, id: TaskId) -> Option<&Detection> {
+        self.known.get(&id).map(|(d, _)| d)
+    }
+
     /// Those that were told in a life of their authors before the one of which is known now: their
     /// authors know nothing of them any more, and nobody passes them on.
     pub fn former(&self, life_of: &dyn Fn(u16) -> Option<Incarnation>) -> Vec<TaskId> {

@@ -5,9 +5,8 @@ use crate::cooperation::Cooperation;
 use crate::effect::{Effect, Effects};
 use crate::input::{AskedTask, NewTask, OperatorsTasks, TaskEdit, Time};
 use crate::mission::Mission;
-use crate::tasking::{KEPT_FOR_COVER, Known, Tasking, why_nobody};
+use crate::tasking::{KEPT_FOR_COVER, Known, Tasking, after_ms, why_nobody};
 use crate::wire::codec::Body;
-use crate::wire::limits::DURATION_MAX_MS;
 use crate::wire::tasks::{
     Progress, TASK_NAME_MAX_BYTES, TASKS_MAX, Task, TaskId, TaskKind, TaskPlace, TaskState,
     check_task, is_task_name, sensor_name,
@@ -83,11 +82,10 @@ impl Tasking {
             return Effects::new();
         };
         let since = known.since;
-        let over_ms = u32::try_from(now.since_ms(since)).unwrap_or(u32::MAX);
         let task = Task {
             revision,
             state: TaskState::Cancelled,
-            over_after_ms: over_ms.min(DURATION_MAX_MS),
+            over_after_ms: after_ms(now, since),
             ..known.task.clone()
         };
         let mut effects = self.learn(now, id, task.clone());
@@ -221,9 +219,7 @@ impl Tasking {
                 if is_over {
                     return Err(format!("the task {name:?} is over already"));
                 }
-                let open = self.known.values().filter(|k| k.is_open());
-                let open: Vec<String> = open.map(|k| k.task.name()).collect();
-                Err(none_named(name, &open))
+                Err(self.none_named(name))
             }
             several => {
                 let by: Vec<String> = several.iter().map(|t| t.author.to_string()).collect();
@@ -233,6 +229,18 @@ impl Tasking {
                 ))
             }
         }
+    }
+
+    /// That no open task is called so, and which there are.
+    fn none_named(&self, name: &str) -> String {
+        let open = self.known.values().filter(|k| k.is_open());
+        let open: Vec<String> = open.map(|k| k.task.name()).collect();
+        let known = if open.is_empty() {
+            "none".to_owned()
+        } else {
+            open.join(", ")
+        };
+        format!("no open task is named {name:?}; there are: {known}")
     }
 
     /// A task of this operator, and if it is the first for its target those who are to stay
@@ -291,15 +299,6 @@ impl Tasking {
         let task = named.asked(number, revision)?;
         Ok((number, task))
     }
-}
-
-fn none_named(name: &str, open: &[String]) -> String {
-    let known = if open.is_empty() {
-        "none".to_owned()
-    } else {
-        open.join(", ")
-    };
-    format!("no open task is named {name:?}; there are: {known}")
 }
 
 /// Most UAVs that may be asked to stay with one target.
@@ -364,11 +363,7 @@ impl Cooperation {
             TaskEdit::Cancel(name) => match self.tasking.named(name) {
                 Some((_, known)) if known.is_open() => Ok(()),
                 Some(_) => Err(format!("the task {name:?} is over already")),
-                None => {
-                    let open = self.tasking.views(Time(0)).into_iter();
-                    let open = open.filter(|t| t.state == TaskState::Open).map(|t| t.name);
-                    Err(none_named(name, &open.collect::<Vec<String>>()))
-                }
+                None => Err(self.tasking.none_named(name)),
             },
             TaskEdit::Done(name) => self.tasking.to_be_done(name).map(|_| ()),
             TaskEdit::Again(_) => Ok(()),

@@ -91,6 +91,24 @@ impl Known {
     pub fn is_open(&self) -> bool {
         self.task.is_open() && self.done.is_none()
     }
+
+    /// Whether somebody did it, and who asked for it has not told so.
+    fn is_newly_done(&self) -> bool {
+        self.task.is_open() && self.done.is_some()
+    }
+
+    /// The task in its next revision, by which who asked for it tells that it is over: done, where
+    /// somebody did it, else as it stands.
+    fn ended(&self, now: Time) -> Task {
+        let mut task = self.task.clone();
+        task.revision = task.revision.saturating_add(1);
+        let over_at = self.done.map_or(now, |(_, at)| at);
+        task.over_after_ms = after_ms(over_at, self.since);
+        if let Some((by, _)) = self.done {
+            (task.state, task.done_by) = (TaskState::Done, by);
+        }
+        task
+    }
 }
 
 /// The task that the UAV flies.
@@ -753,17 +771,10 @@ impl Tasking {
         let expired = self.expire(s.now);
         let mut over: Vec<(TaskId, Task)> = Vec::new();
         for (id, known) in self.known.iter_mut().filter(|(id, _)| id.author == self.me) {
-            let done = known.done.filter(|_| known.task.is_open());
-            if done.is_none() && !expired.contains(id) {
-                continue;
+            if known.is_newly_done() || expired.contains(id) {
+                known.task = known.ended(s.now);
+                over.push((*id, known.task.clone()));
             }
-            let after_ms = done.map_or(s.now, |(_, at)| at).since_ms(known.since);
-            if let Some((by, _)) = done {
-                (known.task.state, known.task.done_by) = (TaskState::Done, by);
-            }
-            known.task.revision = known.task.revision.saturating_add(1);
-            known.task.over_after_ms = u32::try_from(after_ms).unwrap_or(DURATION_MAX_MS);
-            over.push((*id, known.task.clone()));
         }
         for (id, task) in over {
             effects.push(report(id, &task, TaskNews::Over(task.state)));
@@ -778,6 +789,12 @@ impl Tasking {
         }
         effects
     }
+}
+
+/// How long after it was asked for a task was over, as that is said, milliseconds.
+pub(crate) fn after_ms(over: Time, since: Time) -> u32 {
+    let ms = u32::try_from(over.since_ms(since)).unwrap_or(u32::MAX);
+    ms.min(DURATION_MAX_MS)
 }
 
 /// What a bundle says to be done, with the revisions.

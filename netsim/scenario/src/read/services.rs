@@ -1,7 +1,7 @@
 //! Services on the ground of a scenario (D2.7 §3.7: until ground services reach it): from where
 //! they go to what is to be followed, how fast, and along which streets.
 
-use super::shared::{Notices, places, position, targets_of, way_of};
+use super::shared::{Notices, lines_of, position, ways};
 use crate::files::Files;
 use skein_flight::streets::Network;
 use skein_geometry::frame::{Origin, Point};
@@ -21,7 +21,7 @@ const STRETCHES_MAX: usize = 10_000;
 /// Reads `services`.
 pub(crate) fn read(
     list: &Node<'_>,
-    (origin, files): (Origin, &Files<'_>),
+    whence: (Origin, &Files<'_>),
     ground: Option<u16>,
     notices: &mut Notices,
 ) -> Result<Vec<ServiceSpec>, Error> {
@@ -34,17 +34,8 @@ pub(crate) fn read(
         let base = f.need("base", "{ east_m: 0, north_m: 0 }")?;
         let lines = match (f.get("ways_m"), f.get("streets")) {
             (None, None) => None,
-            (Some(ways), None) => {
-                let lines: Result<Vec<Vec<Point>>, Error> =
-                    ways.items()?.iter().map(places).collect();
-                Some((ways, lines?))
-            }
-            (None, Some(file)) => {
-                let found = targets_of(file, files, notices)?;
-                let line = |l| way_of(file, origin, l);
-                let lines: Result<Vec<Vec<Point>>, Error> = found.lines.iter().map(line).collect();
-                Some((file, lines?))
-            }
+            (Some(typed), None) => Some((typed, ways(typed)?)),
+            (None, Some(file)) => Some((file, lines_of(file, whence, notices)?)),
             (Some(_), Some(file)) => {
                 return Err(file.wrong("expected one of ways_m and streets, or neither"));
             }

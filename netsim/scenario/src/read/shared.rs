@@ -37,6 +37,22 @@ pub(crate) fn way_of(node: &Node<'_>, origin: Origin, l: &LineTarget) -> Result<
     way.map_err(|e| node.wrong(format!("{name}: at {}: {e}", l.pointer)))
 }
 
+/// The lines of a file, metres from an origin.
+pub(crate) fn lines_of(
+    node: &Node<'_>,
+    (origin, files): (Origin, &Files<'_>),
+    notices: &mut Notices,
+) -> Result<Vec<Vec<Point>>, Error> {
+    let found = targets_of(node, files, notices)?;
+    let lines = found.lines.iter();
+    lines.map(|l| way_of(node, origin, l)).collect()
+}
+
+/// Lines typed as lists of [east, north] in metres.
+pub(crate) fn ways(list: &Node<'_>) -> Result<Vec<Vec<Point>>, Error> {
+    list.items()?.iter().map(places).collect()
+}
+
 /// A position typed as metres `east_m`, `north_m`.
 pub(crate) fn position(f: &Fields<'_>) -> Result<Point, Error> {
     let coordinate = |name| {

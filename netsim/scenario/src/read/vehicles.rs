@@ -1,7 +1,7 @@
 //! Vehicles on the ground of a scenario (D2.7 §1.5.2): on which roads, from where, how fast,
 //! and what they do.
 
-use super::shared::{Notices, places, position, targets_of, way_of};
+use super::shared::{Notices, lines_of, places, position, ways};
 use crate::files::Files;
 use skein_geometry::frame::{Origin, Point, Vector};
 use skein_interop::json::{Error, Fields, Node, suggestion};
@@ -52,11 +52,7 @@ pub(crate) fn read(
         }
         let roads = match (f.get("way_m"), f.get("ways_m"), f.get("streets")) {
             (Some(way), None, None) => of_ways(way, &[places(way)?])?,
-            (None, Some(ways), None) => {
-                let lines: Result<Vec<Vec<Point>>, Error> =
-                    ways.items()?.iter().map(places).collect();
-                of_ways(ways, &lines?)?
-            }
+            (None, Some(typed), None) => of_ways(typed, &ways(typed)?)?,
             (None, None, Some(file)) => of_file(file, (origin, files), notices)?,
             _ => {
                 return Err(item.wrong(
@@ -205,13 +201,11 @@ fn of_ways(way: &Node<'_>, lines: &[Vec<Point>]) -> Result<Roads, Error> {
 
 fn of_file(
     node: &Node<'_>,
-    (origin, files): (Origin, &Files<'_>),
+    whence: (Origin, &Files<'_>),
     notices: &mut Notices,
 ) -> Result<Roads, Error> {
     let name = node.text()?;
-    let found = targets_of(node, files, notices)?;
-    let line = |l| way_of(node, origin, l);
-    let lines: Vec<Vec<Point>> = found.lines.iter().map(line).collect::<Result<_, _>>()?;
+    let lines = lines_of(node, whence, notices)?;
     Roads::of(&lines).ok_or_else(|| {
         node.wrong(format!(
             "{name} has no streets that hang together; expected 200 m of them at least"

@@ -173,6 +173,23 @@ pub struct Around<'a> {
     pub handicaps: &'a Handicaps,
 }
 
+impl Around<'_> {
+    /// Whether something goes on for longer than it takes a UAV to know, since some time and since
+    /// its component is what it is; it is told once.
+    fn has_gone_on<K: Copy + Ord>(
+        &self,
+        clocks: &mut Clocks<K>,
+        key: K,
+        uav: u16,
+        (now_ms, since_ms): (u64, u64),
+    ) -> bool {
+        let joined_ms = self.stability.component_since_ms(uav).unwrap_or(now_ms);
+        let from_ms = clocks.start(key, now_ms).max(joined_ms).max(since_ms);
+        let bound_ms = self.handicaps.grown_ms(KNOWN_MS, from_ms, now_ms);
+        now_ms.saturating_sub(from_ms) > bound_ms && clocks.tell_once(key)
+    }
+}
+
 impl DetectionCheck {
     /// The operator has a mission.
     pub fn on_mission(&mut self, mission: &Mission) {
@@ -465,10 +482,7 @@ impl DetectionCheck {
             }
             let key = (a.0, b.0, a.2);
             now.insert(key);
-            let joined_ms = around.stability.component_since_ms(a.0).unwrap_or(now_ms);
-            let from_ms = self.twice.start(key, now_ms).max(joined_ms);
-            let bound_ms = around.handicaps.grown_ms(KNOWN_MS, from_ms, now_ms);
-            if now_ms.saturating_sub(from_ms) > bound_ms && self.twice.tell_once(key) {
+            if around.has_gone_on(&mut self.twice, key, a.0, (now_ms, 0)) {
                 found.broken("detect-twice", now_ms, Some(b.0), || {
                     format!(
                         "follows vehicle {} for the task {}.{} as uav{} does for {}.{}",
@@ -494,11 +508,7 @@ impl DetectionCheck {
             };
             let key = (look.uav, task);
             now.insert(key);
-            let joined_ms = around.stability.component_since_ms(look.uav);
-            let joined_ms = joined_ms.unwrap_or(now_ms).max(*served_ms);
-            let from_ms = self.kept.start(key, now_ms).max(joined_ms);
-            let bound_ms = around.handicaps.grown_ms(KNOWN_MS, from_ms, now_ms);
-            if now_ms.saturating_sub(from_ms) > bound_ms && self.kept.tell_once(key) {
+            if around.has_gone_on(&mut self.kept, key, look.uav, (now_ms, *served_ms)) {
                 found.broken("detect-served", now_ms, Some(look.uav), || {
                     format!(
                         "follows for the task {}.{} what services on the ground reached at {served_ms} ms",

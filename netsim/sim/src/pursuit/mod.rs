@@ -165,6 +165,32 @@ pub struct Settings {
     pub lasts_s: f64,
 }
 
+impl Settings {
+    /// The usual pursuit on these roads: two UAVs after one target at 8 m/s in calm air for 300 s,
+    /// nothing that hides it, no noise, and nobody taken away.
+    #[must_use]
+    pub fn on(roads: Roads) -> Self {
+        Self {
+            roads,
+            buildings: None,
+            zones: None,
+            uavs: 2,
+            targets: 1,
+            wind_mps: 0.0,
+            target_mps: 8.0,
+            behaviour: None,
+            field: Field::HOPF,
+            airspeeds: None,
+            stand_off_m: 150.0,
+            optics: Optics::gimballed(),
+            noise: None,
+            knows: Knows::default(),
+            kill: false,
+            lasts_s: 300.0,
+        }
+    }
+}
+
 /// A vehicle that is followed, as it is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Truth {

@@ -7,23 +7,11 @@ use skein_geometry::Polygon;
 use std::sync::Arc;
 
 fn settings() -> Settings {
+    let roads = Roads::of(&grid(8, 180.0)).unwrap();
     Settings {
-        roads: Roads::of(&grid(8, 180.0)).unwrap(),
-        buildings: None,
-        zones: None,
-        uavs: 2,
-        targets: 1,
         wind_mps: 4.0,
-        target_mps: 8.0,
-        behaviour: None,
-        field: Field::HOPF,
-        airspeeds: None,
-        stand_off_m: 150.0,
-        optics: Optics::gimballed(),
-        noise: None,
-        knows: Knows::default(),
-        kill: false,
         lasts_s: 240.0,
+        ..Settings::on(roads)
     }
 }
 

@@ -200,7 +200,7 @@ impl Tasking {
         let Some((id, _)) = self.sought() else {
             return Effects::new();
         };
-        if self.detections.known().all(|(d, _)| d != id) {
+        if self.detections.get(id).is_none() {
             return Effects::new();
         }
         let Some(mine) = self.followed(id) else {

@@ -16,8 +16,7 @@ use crate::input::Time;
 use crate::mission::mm;
 use crate::wire::codec::Body;
 use crate::wire::detection::DETECTIONS_MAX;
-use crate::wire::limits::DURATION_MAX_MS;
-use crate::wire::tasks::{Bundle, DONE_MAX, DoneTask, TaskId, TaskKind, TaskState};
+use crate::wire::tasks::{Bundle, DONE_MAX, DoneTask, Task, TaskId, TaskKind};
 use serde::{Deserialize, Serialize};
 
 /// What services on the ground are wanted for, as a ground station knows it.
@@ -41,8 +40,7 @@ impl Tasking {
         let open = self.known.iter();
         let open = open.filter(|(_, k)| k.is_open() && k.task.kind == TaskKind::Track);
         let call = |(id, k): (&TaskId, &Known)| {
-            let mut all = self.detections.known();
-            let (_, told) = all.find(|(d, _)| d == id)?;
+            let told = self.detections.get(*id)?;
             let revision = k.task.revision_as_asked();
             let seen = self.targets.heard_at(now, (*id, revision));
             let at_mm = seen.map_or((told.east_mm, told.north_mm), |p| (mm(p.x), mm(p.y)));
@@ -120,20 +118,11 @@ impl Tasking {
 
     /// An object that this peer told of, and that is done with, is told to be so by its task.
     pub(super) fn tell_served(&mut self, now: Time) -> Effects {
-        let own = self.known.iter().filter(|(id, k)| {
-            let is_object = id.author == self.me && id.number < DETECTIONS_MAX;
-            is_object && k.task.is_open()
+        let served = self.own().filter(|(id, k)| {
+            let is_object = id.number < DETECTIONS_MAX;
+            is_object && k.is_newly_done()
         });
-        let served = own.filter_map(|(id, k)| {
-            let (by, at) = k.done?;
-            let over_ms = u32::try_from(at.since_ms(k.since)).unwrap_or(u32::MAX);
-            let mut task = k.task.clone();
-            task.revision = task.revision.saturating_add(1);
-            (task.state, task.done_by) = (TaskState::Done, by);
-            task.over_after_ms = over_ms.min(DURATION_MAX_MS);
-            Some((*id, task))
-        });
-        let served: Vec<_> = served.collect();
+        let served: Vec<(TaskId, Task)> = served.map(|(id, k)| (*id, k.ended(now))).collect();
         let mut effects = Effects::new();
         for (id, task) in served {
             effects.extend(self.learn(now, id, task.clone()));
