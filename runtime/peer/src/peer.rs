@@ -309,11 +309,12 @@ impl Peer {
                 if kind.relayed() && self.relay.offer(self.now, record, bytes, hops) != Offer::New {
                     return;
                 }
+                let author = (record.author, record.incarnation);
+                self.membership.on_record(self.now, author, hops);
                 if let Body::Bid(bid) = body {
                     self.diary.note_bid(self.now, record.author, bid);
                 }
                 if let Body::Claim(claim) = body {
-                    let author = (record.author, record.incarnation);
                     let works_on = (claim.revision, claim.loop_hash);
                     self.membership.on_claim(self.now, author, works_on);
                 }

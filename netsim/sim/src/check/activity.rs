@@ -82,6 +82,9 @@ pub struct ActivityCheck {
     looked_ms: BTreeMap<u16, u64>,
     /// Sorties that some UAV ended by its timer.
     ended: BTreeSet<u16>,
+    /// The sortie in which a process knew of what ends it. Of what was told twice one is
+    /// withdrawn, and who hears of that first has ended rightly all the same.
+    found: BTreeMap<u16, u16>,
     /// The goals to which the events of now lead, where they lead to one.
     wanted: BTreeMap<u16, StateGoal>,
     wrong: Clocks<u16>,
@@ -121,6 +124,7 @@ impl ActivityCheck {
         if death {
             self.began.remove(&id);
             self.early.remove(&id);
+            self.found.remove(&id);
         }
     }
 
@@ -310,6 +314,9 @@ impl ActivityCheck {
         let after_s = flown.machine.ends_after_s();
         let timer = after_s.map(|s| facts.holds(0, (MissionEvent::Timer, s)));
         if flown.machine.ends_when_found() && facts.is_found() {
+            self.found.insert(m.id, flown.sortie);
+        }
+        if self.found.get(&m.id) == Some(&flown.sortie) {
             return;
         }
         if timer.is_some_and(|holds| holds != Holds::No) {
@@ -522,6 +529,9 @@ mod tests {
     use crate::world::fixture;
     use skein_peer::Beliefs;
     use skein_peer::Mission;
+    use skein_peer::diagram::{State, Transition};
+    use skein_peer::wire::detection::Detection;
+    use skein_peer::wire::tasks::TaskId;
     use std::sync::Arc;
 
     fn mission() -> Arc<Mission> {
@@ -548,6 +558,42 @@ mod tests {
         Beliefs {
             stage: at.map(|at| (at, MissionEvent::Otherwise)),
             ..view
+        }
+    }
+
+    /// The default mission with one state more, in which its UAVs are at home as well, and the
+    /// event that leads there.
+    fn with_state(
+        name: &str,
+        part: Option<Part>,
+        (on, above_dmps): (MissionEvent, u32),
+    ) -> Mission {
+        let mut diagram = mission().flown_by().into_owned();
+        let mut all = diagram.states.iter();
+        let home = all.find(|s| s.name == "recalled").unwrap();
+        let state = State {
+            name: name.into(),
+            part: part.unwrap_or(home.part),
+            ..home.clone()
+        };
+        diagram.states.push(state);
+        for t in &mut diagram.transitions {
+            t.priority *= 2;
+        }
+        let mut all = diagram.transitions.iter();
+        let low_fuel = all.find(|t| t.on == MissionEvent::LowFuel).unwrap();
+        let leads = Transition {
+            from: None,
+            on,
+            after_s: 0,
+            above_dmps,
+            to: name.into(),
+            priority: low_fuel.priority + 1,
+        };
+        diagram.transitions.push(leads);
+        Mission {
+            diagram: Some(Arc::new(diagram)),
+            ..(*mission()).clone()
         }
     }
 
@@ -649,34 +695,7 @@ mod tests {
 
     #[test]
     fn what_a_uav_came_home_for_in_a_wind_holds_on_for_a_while() {
-        let mut diagram = mission().flown_by().into_owned();
-        let home = diagram
-            .states
-            .iter()
-            .find(|s| s.name == "recalled")
-            .unwrap();
-        let mut shelter = home.clone();
-        shelter.name = "shelter".into();
-        diagram.states.push(shelter);
-        for t in &mut diagram.transitions {
-            t.priority *= 2;
-        }
-        let low_fuel = diagram
-            .transitions
-            .iter()
-            .find(|t| t.on == MissionEvent::LowFuel);
-        diagram.transitions.push(skein_peer::diagram::Transition {
-            from: None,
-            on: MissionEvent::WindAbove,
-            after_s: 0,
-            above_dmps: 60,
-            to: "shelter".into(),
-            priority: low_fuel.unwrap().priority + 1,
-        });
-        let mission = Mission {
-            diagram: Some(Arc::new(diagram)),
-            ..(*mission()).clone()
-        };
+        let mission = with_state("shelter", None, (MissionEvent::WindAbove, 60));
         let machine = mission.machine().unwrap();
         let broken = |views: &[(&str, MissionEvent, f64)]| {
             let (mut story, mut found) = (Story::new(0), Findings::new(1));
@@ -725,6 +744,44 @@ mod tests {
             ("shelter", came, 4.9)
         ]));
         assert!(!broken(&[("shelter", came, 6.1), ("wait", waits, 4.9)]));
+    }
+
+    #[test]
+    fn who_ended_by_what_was_found_has_ended_rightly_when_that_is_withdrawn() {
+        let mission = with_state("found", Some(Part::Ends), (MissionEvent::ObjectDetected, 0));
+        let found = mission.machine().unwrap();
+        let found = found.states().iter().position(|s| s.name == "found");
+        let broken = |stands: &[Stands]| {
+            let (mut story, mut findings) = (Story::new(0), Findings::new(1));
+            let mut check = ActivityCheck::default();
+            check.on_mission(&mission);
+            for (t, stands) in (0..).zip(stands) {
+                let told = Detection {
+                    stands: *stands,
+                    ..Detection::default()
+                };
+                let id = TaskId {
+                    author: 2,
+                    number: 8,
+                };
+                let view = Beliefs {
+                    finished: true,
+                    stage: found.map(|at| (at, MissionEvent::ObjectDetected)),
+                    detections: vec![(id, told)],
+                    ..speaking()
+                };
+                story.snapshot(t * 1000, &[(1, view)], |s| {
+                    check.on_snapshot(s, &mut findings)
+                });
+            }
+            findings.counts.contains_key("activity")
+        };
+        assert!(!broken(&[
+            Stands::Told,
+            Stands::Withdrawn,
+            Stands::Withdrawn
+        ]));
+        assert!(broken(&[Stands::Withdrawn]));
     }
 
     #[test]

@@ -46,6 +46,13 @@ const MEANT_M: f64 = 40.0;
 const FASTER: f64 = 1.6;
 const NEAR_M: f64 = 45.0;
 
+/// The error that is told is four standard deviations: one of 3,000 is farther off. So much more,
+/// six of them, one of 60 million is.
+const NEVER: f64 = 1.5;
+
+/// So many of one run may be between the two.
+const FAR_MAX: usize = 1;
+
 /// A vehicle as it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
@@ -153,6 +160,8 @@ pub struct DetectionCheck {
     told: BTreeMap<(u16, u16, u64), Told>,
     /// Which vehicles were told in this sortie.
     known: BTreeSet<usize>,
+    /// How many were farther from where they were told to be than the error that was told.
+    n_far: usize,
     pictured: BTreeMap<(u16, usize), Pictured>,
     first_ms: BTreeMap<usize, u64>,
     twice: Clocks<(u16, u16, usize)>,
@@ -255,9 +264,11 @@ impl DetectionCheck {
         let off = all.map(|(n, v)| (n, (v.at - at).norm()));
         let nearest = off.min_by(|a, b| a.1.total_cmp(&b.1));
         // One who was late is believed within what its object can have driven meanwhile.
-        let within_m = error_m + 40.0 * seconds(late_ms.saturating_sub(LATE_MS));
-        let there = nearest.filter(|(_, off_m)| *off_m <= within_m);
-        if there.is_none() {
+        let more_m = 40.0 * seconds(late_ms.saturating_sub(LATE_MS));
+        let there = nearest.filter(|(_, off_m)| *off_m <= NEVER * error_m + more_m);
+        let is_far = there.is_some_and(|(_, off_m)| off_m > error_m + more_m);
+        self.n_far += usize::from(is_far);
+        if there.is_none() || is_far && self.n_far > FAR_MAX {
             let words = told.sentence(id.author);
             found.broken("detect-false", now_ms, Some(by), || match nearest {
                 Some((n, off_m)) => {

@@ -38,8 +38,8 @@ enum Owed {
     Cell(u16),
     /// Whether it hears anybody.
     Alone,
-    /// That the mission is finished.
-    Finished,
+    /// That the mission is finished, in this revision.
+    Finished(u32),
 }
 
 /// What the records of one run were found to say.
@@ -175,7 +175,7 @@ impl SpokenCheck {
         let mut owed = self.claim_owed(m.id, &m.view);
         let key = (m.id, m.view.incarnation, m.view.revision);
         if m.view.finished && !self.finished.contains(&key) {
-            owed.insert(Owed::Finished);
+            owed.insert(Owed::Finished(m.view.revision));
         }
         owed
     }
@@ -189,7 +189,7 @@ impl SpokenCheck {
         };
         let periods = match key.1 {
             Owed::Cell(_) | Owed::Alone => claimed,
-            Owed::Finished => FINISHED_PERIODS,
+            Owed::Finished(_) => FINISHED_PERIODS,
         };
         let since_ms = self.unspoken.start(key, snapshot.now_ms);
         let took_ms = snapshot.lived_ms(key.0, since_ms);
@@ -201,7 +201,7 @@ impl SpokenCheck {
                     Owed::Alone => {
                         "its claim and its belief differ in whether it hears anybody".to_owned()
                     }
-                    Owed::Finished => "has not said that the mission is finished".to_owned(),
+                    Owed::Finished(_) => "has not said that the mission is finished".to_owned(),
                 };
                 format!("{text}, for {took_ms} ms (bound {bound_ms} ms)")
             });
@@ -415,6 +415,23 @@ mod tests {
                 story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
             }
             assert_eq!(found.counts.contains_key("spoken"), !says);
+        }
+    }
+
+    #[test]
+    fn an_end_is_owed_anew_in_each_revision() {
+        for changes in [true, false] {
+            let (mut check, mut found) = (SpokenCheck::default(), Findings::new(1));
+            let mut story = Story::new(0);
+            for t in 0..16 {
+                let view = Beliefs {
+                    finished: true,
+                    revision: if changes && t >= 8 { 2 } else { 1 },
+                    ..speaking()
+                };
+                story.snapshot(t * 1000, &[(1, view)], |s| check.on_snapshot(s, &mut found));
+            }
+            assert_eq!(found.counts.contains_key("spoken"), !changes);
         }
     }
 

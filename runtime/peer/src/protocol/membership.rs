@@ -10,6 +10,7 @@
 //! |---|---|---|
 //! | unknown | a heartbeat younger than the bound, not condemned | alive or suspect |
 //! | unknown | a heartbeat older than the bound, or condemned | down: its records are asked for |
+//! | unknown, or an earlier life | a record of it is held for longer than the bound, and no heartbeat came | down, in that life: gossip tells of it |
 //! | alive | its freshest heartbeat was heard directly, k1 I ago | suspect |
 //! | alive | half of that, and the transport says that the link is gone | suspect |
 //! | alive | a suspicion against this very heartbeat is heard | suspect |
@@ -112,6 +113,9 @@ pub struct Membership {
     me: u16,
     period_ms: u64,
     known: BTreeMap<u16, Known>,
+    /// Whose records are held that no heartbeat of that life came of: in which life, since when
+    /// and by how many hops.
+    unheard: BTreeMap<u16, (Incarnation, Time, u8)>,
     telling: Telling,
     questions: Questions,
     /// What this peer announced itself, quarters of T.
@@ -140,6 +144,7 @@ impl Membership {
             me,
             period_ms: u64::from(period_ms.max(1)),
             known: BTreeMap::new(),
+            unheard: BTreeMap::new(),
             telling: Telling::new(me),
             questions: Questions::default(),
             interval: INTERVAL_LEAST,
@@ -319,6 +324,53 @@ impl Membership {
                 known.info.is_own_word = true;
             }
         });
+    }
+
+    /// A record that is new here, passed on so often. If no heartbeat of its author ever follows,
+    /// nobody would tell of the record to who did not hear it.
+    pub fn on_record(&mut self, now: Time, (author, incarnation): (u16, Incarnation), hops: u8) {
+        let is_new = self.is_unheard(author, incarnation) && author != self.me;
+        let has_room = self.unheard.len() < MAX_KNOWN || self.unheard.contains_key(&author);
+        if is_new && has_room && self.may_live_in(author, incarnation) {
+            let hops = hops.saturating_add(1).min(HOPS_MAX);
+            let heard = (incarnation, now, hops);
+            let noted = self.unheard.entry(author).or_insert(heard);
+            if noted.0 < incarnation {
+                *noted = heard;
+            }
+        }
+    }
+
+    /// Whether no heartbeat of this life or a later one is known.
+    fn is_unheard(&self, id: u16, life: Incarnation) -> bool {
+        let known = self.known.get(&id);
+        known.is_none_or(|k| k.freshest.incarnation < life)
+    }
+
+    /// Who said something and was never heard living takes its place among the dead.
+    fn bury_unheard(&mut self, now: Time, bound_ms: u64, changes: &mut Vec<Change>) {
+        let mut unheard = std::mem::take(&mut self.unheard);
+        unheard.retain(|id, (life, ..)| self.is_unheard(*id, *life));
+        let waited_ms = self.waited_ms(now);
+        for (id, (incarnation, since, hops)) in &unheard {
+            if now.since_ms(*since).saturating_sub(waited_ms) > bound_ms {
+                let last = HeardHeartbeat {
+                    id: *id,
+                    incarnation: *incarnation,
+                    count: 0,
+                    age: Age {
+                        told_ms: 0,
+                        at: *since,
+                    },
+                    hops: *hops,
+                    interval: self.interval,
+                    suspected: None,
+                };
+                self.noting(now, *id, |m| m.remember_dead(now, last, changes));
+            }
+        }
+        unheard.retain(|id, (life, ..)| self.is_unheard(*id, *life));
+        self.unheard = unheard;
     }
 
     /// What a neighbour says with its heartbeat of those of others. Returns what changed.
@@ -759,6 +811,7 @@ impl Membership {
             self.extent.set(None);
             self.changes += 1;
         }
+        self.bury_unheard(now, patience.bound_ms, &mut changes);
         if self.floods(&patience) {
             for known in self.known.values_mut() {
                 if known.asks_at_once(now, &patience, self.period_ms) {

@@ -7,6 +7,7 @@
 //! | orphans | 2 T (5 T after a decision) | a repair |
 //! | an open round with a member that is gone, or left for another loop | at once | the next round |
 //! | an open round without all bids | W, doubling to 4 W0 | the next round |
+//! | a rebalancing whose time was over while this peer could not fly | once it can | nothing |
 //! | a complete round without its division | 2 W | the next round |
 //! | nothing divided yet | 1.5 T of listening, with a roster at once | a first section is taken |
 //! | only first sections, among few | 2 T | a repair |
@@ -464,10 +465,15 @@ impl Negotiation {
             let gone = others.clone().any(is_gone);
             let waited = ctx.now.since_ms(self.opened_at);
             let repair = open.round.repair || !orphans.is_empty();
-            if gone {
+            let patience_ms = self.patience_ms(open);
+            let back_ms = ctx.able_since.map_or(0, |t| t.since_ms(self.opened_at));
+            if !repair && back_ms > patience_ms {
+                // What it wished for then, or others did, is long decided without it.
+                self.rounds.give_up();
+            } else if gone {
                 self.rounds.give_up();
                 self.start(ctx, repair, 0);
-            } else if waited > self.patience_ms(open) {
+            } else if waited > patience_ms {
                 self.rounds.give_up();
                 self.start(ctx, repair, self.retries + 1);
             }

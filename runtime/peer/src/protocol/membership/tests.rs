@@ -40,6 +40,36 @@ fn silence_leads_to_suspicion_and_then_to_a_verdict() {
 }
 
 #[test]
+fn of_whom_a_record_alone_was_heard_others_are_told_as_of_the_dead() {
+    let mut m = Membership::new(1, 1000);
+    m.on_record(Time(0), (2, 5), 3);
+    m.on_record(Time(0), (3, 5), 3);
+    m.on_record(Time(0), (1, 5), 0);
+    let bound_ms = m.patience(Time(0)).bound_ms;
+    let told_of = |m: &mut Membership, t: u64| {
+        let told = m.gossip(Time(t), 4);
+        let told: BTreeSet<_> = told.iter().map(|g| (g.id, g.incarnation)).collect();
+        told
+    };
+    assert_eq!(m.tick(Time(bound_ms)), []);
+    assert!(told_of(&mut m, bound_ms).is_empty());
+    // The one of them speaks in time.
+    m.on_heartbeat(Time(bound_ms), 3, 5, (1, 4));
+    assert_eq!(m.tick(Time(bound_ms + 250)), []);
+    let both = BTreeSet::from([(2, 5), (3, 5)]);
+    assert_eq!(told_of(&mut m, bound_ms + 250), both);
+    assert_eq!(m.live().map(|(id, _)| id).collect::<Vec<_>>(), [3]);
+    // Neighbours take it for dead, and the one itself is heard all the same.
+    let mut other = Membership::new(4, 1000);
+    let told = m.gossip(Time(bound_ms + 250), 4);
+    other.on_beacon(Time(bound_ms + 250), 1, 1, &beacon(1, told));
+    assert_eq!(other.all().filter(|(id, ..)| *id == 2).count(), 1);
+    assert!(other.live().all(|(id, _)| id != 2));
+    m.on_heartbeat(Time(bound_ms + 500), 2, 5, (1, 4));
+    assert!(m.live().any(|(id, _)| id == 2));
+}
+
+#[test]
 fn a_link_that_is_gone_halves_the_patience_and_passes_no_verdict() {
     let mut m = Membership::new(1, 1000);
     m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));

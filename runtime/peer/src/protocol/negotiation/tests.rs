@@ -412,6 +412,25 @@ fn a_return_waits_until_it_is_steady() {
 }
 
 #[test]
+fn a_rebalancing_that_ran_out_while_a_peer_was_away_is_not_tried_again() {
+    for (repair, again) in [(false, false), (true, true)] {
+        let mut desk = Desk::new(&[2]);
+        desk.claim(2, 1, 0, 24, 600_000);
+        desk.ask(|n, ctx| n.start(ctx, repair, 0));
+        assert!(desk.tick().contains(&Action::Bid));
+        desk.able_since = None;
+        assert_eq!(desk.wait(60 * T), None);
+        desk.able_since = Some(desk.now);
+        let tried = desk.tick().contains(&Action::Bid);
+        assert_eq!(tried, again, "repair {repair}");
+        if !again {
+            let (after_ms, _) = desk.wait(60 * T).unwrap();
+            assert!((10 * T..11 * T).contains(&after_ms), "{after_ms}");
+        }
+    }
+}
+
+#[test]
 fn the_far_half_of_a_stalled_owner_is_taken_from_its_end() {
     let mut desk = Desk::new(&[2]);
     // So few cells that no round is worth it.
