@@ -11,7 +11,7 @@
 //! | where it flies to stays out of view for longer than the way there takes | that is given up |
 //! | it is seen again, or seen by another later | the chances are dropped |
 
-use super::{Fused, Sought, Targets, shows, standing};
+use super::{Fused, INNER, Sought, Targets, shows, standing};
 use skein_behaviors::Percept;
 use skein_behaviors::view::View;
 use skein_flight::tracking::chance::ChanceMap;
@@ -73,7 +73,9 @@ enum Chances {
 struct Searcher<'a> {
     now_ms: u64,
     looker: Looker,
+    /// Whether a vehicle at a place would be seen, and whether a place in the picture is a roof.
     shows: &'a dyn Fn(Point) -> bool,
+    covers: &'a dyn Fn(Point) -> bool,
     may_fly: &'a dyn Fn(Point) -> bool,
 }
 
@@ -89,7 +91,8 @@ impl Chances {
         match (self, streets) {
             (Self::Ground(map), _) => {
                 map.go_on(by.now_ms);
-                map.look(by.shows);
+                // Who keeps to no street is not within a house, whatever is seen of that.
+                map.look(&|p| (by.shows)(p) || (by.covers)(p));
                 map.look_next(by.looker.at, by.looker.airspeed_mps, by.may_fly)
             }
             (Self::Streets(chances, until_ms), Some(streets)) => {
@@ -186,6 +189,7 @@ impl Targets {
                     reach_m: airframe.footprint_across_m.min(airframe.footprint_along_m),
                 },
                 shows: &|p| shows(&view, percept, town, p),
+                covers: &|p| view.shows(p, INNER) && town.is_some_and(|t| t.buildings.cover(p)),
                 may_fly,
             };
             search.aim = search.chances.go_on(streets, &by, search.aim);
