@@ -292,10 +292,10 @@ pub(crate) mod tests {
         }
         let wide = Building {
             roof_dm: 300,
-            ring: star(400),
+            ring: star(190),
         };
         let town = Buildings {
-            all: vec![wide; 15],
+            all: vec![wide; 32],
         };
         let said = town.check().unwrap_err();
         assert!(said.contains("bytes of buildings are too many"), "{said}");

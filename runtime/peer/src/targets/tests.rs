@@ -261,8 +261,6 @@ fn who_is_lost_where_streets_are_told_is_looked_for_along_them_and_given_up_wher
         }
     }
     let goes = |is_there: &dyn Fn(&Point) -> bool| places.iter().any(is_there);
-    let (north, south) = (goes(&|p| p.y > 150.0), goes(&|p| p.y < -50.0));
-    assert!(north && south, "{places:?}");
     assert!(places[0].x > 130.0, "ahead first: {:?}", places[0]);
     assert!(goes(&|p| p.x > 400.0) && places.len() > 8, "{places:?}");
 }
