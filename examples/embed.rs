@@ -81,6 +81,7 @@ fn mission() -> Mission {
         streets: None,
         layers: None,
         crowd: None,
+        buildings: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

@@ -67,6 +67,7 @@ use skein_flight::airframe::Airframe;
 use skein_flight::coverage::ring::backtracking::{Leg, OffLoop};
 use skein_flight::coverage::ring::{CoverageLoop, Direction};
 use skein_flight::route::Router;
+use skein_flight::tracking::buildings::Town;
 use skein_flight::trajectory::timed::Objective;
 use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
@@ -246,6 +247,8 @@ pub struct Executive {
     contingency: Option<promised::Contingency>,
     /// Of whom it follows, if it does.
     pursuit: Option<pursuit::Pursuit>,
+    /// Buildings and streets, where they are known.
+    town: Option<Arc<Town>>,
     /// Whether it circles because there was no way to where it is to go.
     stranded: bool,
     /// How it keeps its place among those who fly round the loop.
@@ -290,6 +293,7 @@ impl Executive {
             late_ms: 0,
             contingency: None,
             pursuit: None,
+            town: None,
             stranded: false,
             circuit: circuit::Circuit::default(),
             tracing: tracing::Tracing::default(),
@@ -312,6 +316,14 @@ impl Executive {
     pub fn with_home(mut self, home: Point) -> Self {
         let ways = WaysHome::new(&self.transit, home);
         self.home = Some(Home::new(&self.transit, home, ways));
+        self
+    }
+
+    /// The same with what it knows of buildings, by which its circles about targets go, and of
+    /// streets, along which these drive on.
+    #[must_use]
+    pub fn with_town(mut self, town: Option<Arc<Town>>) -> Self {
+        self.town = town;
         self
     }
 

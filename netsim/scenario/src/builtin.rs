@@ -127,6 +127,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/track.json5"),
     ),
     (
+        "downtown",
+        "downtown.json5",
+        include_str!("../../../configs/trials/downtown.json5"),
+    ),
+    (
         "lookout",
         "lookout.json5",
         include_str!("../../../configs/trials/lookout.json5"),

@@ -76,6 +76,7 @@ pub(crate) fn blamed(e: &GeometryError) -> &'static str {
         GeometryError::Streets(..) => "mission.streets",
         GeometryError::Layers(_) => "mission.layers_m",
         GeometryError::Crowd(..) => "mission.crowd",
+        GeometryError::Buildings(_) => "mission.buildings",
         GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
             "no_fly"
         }

@@ -87,6 +87,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         counts: s.counts.clone(),
         streets: s.streets.clone(),
         crowd: s.crowd.clone(),
+        buildings: s.buildings_told.clone(),
         tree: lanes.tree.unwrap_or_default(),
         division: s.division,
         separation_mm: length_mm((s.fleet.separation_m * 1000.0).ceil()),

@@ -91,6 +91,7 @@
 //! with what [`offload::run`] returned, computed wherever the driver likes.
 
 pub mod beliefs;
+pub mod buildings;
 mod carried;
 pub mod cells;
 mod company;

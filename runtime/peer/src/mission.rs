@@ -1,5 +1,6 @@
 //! What a mission is: area, zones, lanes, level, origin, revision.
 
+use crate::buildings::Buildings;
 use crate::count_site::{CountSite, SITES_MAX};
 use crate::criteria::{CRITERIA_MAX, Criterion};
 use crate::crowd::CrowdWatch;
@@ -114,6 +115,9 @@ pub struct Mission {
     /// The mass event that is watched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crowd: Option<Arc<CrowdWatch>>,
+    /// What may hide whom somebody follows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub buildings: Option<Arc<Buildings>>,
 }
 
 /// Whether a field need not be said.
@@ -188,6 +192,9 @@ pub enum GeometryError {
     /// The event that it watches has no sectors that can be seen, or no norm.
     #[error("crowd.{0}: {1}")]
     Crowd(&'static str, String),
+    /// Its buildings are too many, or one of them is none.
+    #[error("buildings: {0}")]
+    Buildings(String),
     /// There is no loop over what is to be seen.
     #[error(transparent)]
     Loop(#[from] LoopError),
@@ -349,6 +356,10 @@ impl Mission {
         if let Some(crowd) = &self.crowd {
             h.write_i64(-10);
             crowd.hash(&mut h);
+        }
+        if let Some(buildings) = &self.buildings {
+            h.write_i64(-12);
+            buildings.hash(&mut h);
         }
         h.finish()
     }
@@ -514,6 +525,15 @@ impl Mission {
         checked.map_err(|(place, text)| GeometryError::Streets(place, text))
     }
 
+    /// Whether its buildings fit.
+    ///
+    /// # Errors
+    /// [`GeometryError::Buildings`] names the building and what is wrong.
+    pub fn check_buildings(&self) -> Result<(), GeometryError> {
+        let checked = self.buildings.as_ref().map_or(Ok(()), |b| b.check());
+        checked.map_err(GeometryError::Buildings)
+    }
+
     /// Whether the event that it watches can be seen, sector by sector.
     ///
     /// # Errors
@@ -548,6 +568,7 @@ impl Mission {
         self.check_streets()?;
         self.check_layers().map_err(GeometryError::Layers)?;
         self.check_crowd()?;
+        self.check_buildings()?;
         if self.tasks.len() > BROUGHT_MAX || self.brought(false).len() < self.tasks.len() {
             let text = format!("at most {BROUGHT_MAX} fit, each as an operator may ask for it");
             return Err(GeometryError::Tasks(text));
@@ -792,6 +813,7 @@ mod tests {
             streets: None,
             layers: None,
             crowd: None,
+            buildings: None,
             tree: Tree::default(),
             division: Rule::default(),
             separation_mm: 0,
@@ -957,7 +979,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 48] = [
+        let changes: [fn(&mut Mission); 51] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -1033,6 +1055,17 @@ mod tests {
                 let mut crowd = crate::crowd::tests::event();
                 crowd.dense_e2 += 1;
                 m.crowd = Some(Arc::new(crowd));
+            },
+            |m| m.buildings = Some(Arc::new(crate::buildings::tests::houses(1))),
+            |m| {
+                let mut houses = crate::buildings::tests::houses(1);
+                houses.all[0].roof_dm += 1;
+                m.buildings = Some(Arc::new(houses));
+            },
+            |m| {
+                let mut houses = crate::buildings::tests::houses(1);
+                houses.all[0].ring[2].1 += 1;
+                m.buildings = Some(Arc::new(houses));
             },
             |m| m.counts.push(crossing(0)),
             |m| m.counts.push(crossing(1)),

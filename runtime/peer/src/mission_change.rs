@@ -30,6 +30,7 @@ pub(crate) fn executive_for(geometry: &MissionGeometry, config: &PeerConfig) -> 
         .with_tracking_error_m(mission.tracking_error_m())
         .with_objective(config.objective)
         .with_home(mission.base_m())
+        .with_town(geometry.town.clone())
         .with_late_ms(config.beacon_period_ms);
     Some(if mission.separation_mm > 0 {
         executive.with_promises()

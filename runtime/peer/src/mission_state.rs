@@ -769,7 +769,9 @@ impl MissionState {
             && new.clearance_mm == before.clearance_mm;
         if flown_alike {
             let base = new.base_m();
-            self.executive = old.executive.map(|e| e.with_home(base).without_heeded());
+            let town = &self.geometry.town;
+            let kept = |e: Executive| e.with_home(base).with_town(town.clone());
+            self.executive = old.executive.map(|e| kept(e).without_heeded());
             self.separation = old.separation;
             self.errand = old.errand;
             self.relay = old.relay;

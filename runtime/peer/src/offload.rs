@@ -9,6 +9,7 @@ use skein_flight::coverage::ring::CoverageLoop;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::division::{RouteNetwork, divide};
 use skein_flight::route::Router;
+use skein_flight::tracking::buildings::Town;
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
@@ -24,6 +25,8 @@ pub struct MissionGeometry {
     pub coverage_loop: Arc<CoverageLoop>,
     /// Routes that keep clear of the zones.
     pub router: Arc<Router>,
+    /// Buildings and streets, where the mission tells of any.
+    pub town: Option<Arc<Town>>,
     launched: OnceLock<(Vec<Launch>, Vec<Planned>)>,
 }
 
@@ -32,6 +35,7 @@ impl MissionGeometry {
     #[must_use]
     pub fn new(mission: Arc<Mission>, coverage_loop: CoverageLoop, router: Router) -> Self {
         Self {
+            town: mission.town(),
             mission,
             coverage_loop: Arc::new(coverage_loop),
             router: Arc::new(router),

@@ -30,6 +30,7 @@ use search::{Search, WAYS_MAX};
 use skein_behaviors::Percept;
 use skein_behaviors::view::View;
 use skein_flight::airframe::Airframe;
+use skein_flight::tracking::buildings::Town;
 use skein_flight::tracking::estimate::{Detection, Estimate};
 use skein_flight::tracking::follower::TargetMotion;
 use skein_flight::tracking::fusion::{Board, Fused, Register};
@@ -38,6 +39,7 @@ use skein_flight::tracking::tracks::{Kind, Sighting, TargetName, Tracks};
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::seconds;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// Density of the acceleration of targets, m²/s³: a car that brakes or turns off at 2.5 m/s²
 /// for some three seconds, a quarter of the time.
@@ -146,6 +148,8 @@ pub(crate) struct Targets {
     /// Squares of [`WAY_M`] where vehicles were seen to drive, by whomever: since missions bring
     /// no streets, these are what is known of them.
     ways: BTreeSet<(i16, i16)>,
+    /// Buildings and streets, where the mission tells them.
+    town: Option<Arc<Town>>,
 }
 
 impl Targets {
@@ -165,7 +169,13 @@ impl Targets {
             said_at: Time(0),
             search: None,
             ways: BTreeSet::new(),
+            town: None,
         }
+    }
+
+    /// What the mission tells of buildings and streets.
+    pub fn knows(&mut self, town: Option<&Arc<Town>>) {
+        self.town = town.cloned();
     }
 
     /// A life begins: what it names from now on nobody has named, and what it saw it sees anew.
@@ -185,7 +195,8 @@ impl Targets {
         self.now_ms = percept.time_ms;
         let look: Vec<Sighting> = percept.sightings.seen().map(sighting).collect();
         let view = View::of(percept, &airframe);
-        let in_view = |p: Point| view.shows(p, INNER);
+        let town = self.town.clone();
+        let in_view = |p: Point| shows(&view, percept, town.as_deref(), p);
         self.tracks.look(self.now_ms, &look, &in_view);
         self.count_hits();
         let own: Vec<Register> = self.own().collect();
@@ -507,6 +518,12 @@ fn sought_of(told: &Target) -> Sought {
         number: told.task,
     };
     (task, told.revision)
+}
+
+/// Whether a vehicle at a place would be in the inner part of a picture, and no building before it.
+fn shows(view: &View, percept: &Percept, town: Option<&Town>, p: Point) -> bool {
+    let hides = |t: &Town| t.buildings.hide(view.from(), percept.height_m, p);
+    view.shows(p, INNER) && !town.is_some_and(hides)
 }
 
 /// A target that stands.

@@ -74,6 +74,7 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         streets: None,
         layers: None,
         crowd: None,
+        buildings: None,
         tree: Tree::default(),
         division: Rule::default(),
         separation_mm: 0,

@@ -122,13 +122,14 @@ fn flown(scenario: Result<crate::Scenario, ScenarioError>) -> Result<Diagram, Sc
 }
 
 /// What a mission may bring, also to the default diagram.
-const BRINGS: [&str; 6] = [
+const BRINGS: [&str; 7] = [
     "detections",
     "tasks",
     "counts",
     "streets",
     "layers_m",
     "crowd",
+    "buildings",
 ];
 
 /// What a scenario says of its mission: the diagram that it is flown by, where it names one or

@@ -1,6 +1,7 @@
 //! From the text of a scenario to values with units, one subject a file. Leaves what the
 //! values mean together (mission, loop, feasibility) to the modules that follow.
 
+pub(crate) mod buildings;
 pub(crate) mod contour;
 pub(crate) mod counts;
 pub(crate) mod crowd;
@@ -42,6 +43,7 @@ use skein_netsim::spec::{
     ContourSpec, CrowdSpec, GroundStationSpec, RadioSpec, ServiceSpec, StormSpec, VehicleSpec,
 };
 use skein_netsim::weather::Weather;
+use skein_peer::buildings::Buildings;
 use skein_peer::count_site::CountSite;
 use skein_peer::criteria::Criterion;
 use skein_peer::crowd::CrowdWatch;
@@ -115,6 +117,8 @@ pub(crate) struct Stated {
     pub(crate) layers_m: Vec<f64>,
     /// The mass event that the mission watches.
     pub(crate) crowd: Option<Arc<CrowdWatch>>,
+    /// The buildings that it tells.
+    pub(crate) buildings_told: Option<Arc<Buildings>>,
     /// By what rule the loop is divided.
     pub(crate) division: Rule,
     pub(crate) lanes: Lanes,
@@ -192,6 +196,9 @@ pub(crate) fn scenario(
     let streets = f.get("mission").map_or(Ok(None), |node| {
         streets::of_mission(node, (terrain.origin, files), &terrain.area, &mut notices)
     })?;
+    let buildings_told = f.get("mission").map_or(Ok(None), |node| {
+        buildings::of_mission(node, (&terrain, &fleet), files, &mut notices)
+    })?;
     let mut findings: Vec<Finding> = notices
         .into_iter()
         .map(|(field, text)| Finding {
@@ -226,6 +233,7 @@ pub(crate) fn scenario(
             layers::of_mission(node, terrain.level_m)
         })?,
         crowd: f.get("mission").map_or(Ok(None), crowd::of_mission)?,
+        buildings_told,
         division: f.get("division").map_or(Ok(Rule::Best), division)?,
         lanes: lanes::read(&f)?,
         base: f

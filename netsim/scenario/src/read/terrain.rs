@@ -94,6 +94,21 @@ pub(super) fn zone(
     reader.zones(node, notices)
 }
 
+/// The buildings of a node that says from which file, which counts from the scenario's place.
+pub(super) fn buildings(
+    node: &Node<'_>,
+    origin: Origin,
+    files: &Files<'_>,
+    notices: &mut Notices,
+) -> Result<Vec<Building>, Error> {
+    let reader = Reader {
+        origin,
+        files,
+        shapes: BTreeMap::new(),
+    };
+    reader.buildings(node, notices)
+}
+
 /// Whether nothing of the area sticks out of the zone.
 fn swallows(zone: &Polygon, area: &Polygon) -> bool {
     area.vertices().iter().all(|p| zone.contains(*p))
@@ -381,7 +396,7 @@ fn shapes_of(node: &Node<'_>, text: &str, notices: &mut Notices) -> Result<FileS
 }
 
 /// Convex hull by Andrew's monotone chain, counter-clockwise, in O(n log n).
-fn hull(mut points: Vec<Point>) -> Vec<Point> {
+pub(super) fn hull(mut points: Vec<Point>) -> Vec<Point> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let turn =
         |a: &Point, b: &Point, c: &Point| (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);

@@ -48,6 +48,9 @@ pub struct Tracked {
     /// Of that, how long it was in the pictures of two or more at once, ms.
     #[serde(default)]
     pub twice_ms: u64,
+    /// Of that, the longest time for which no one had it there, ms.
+    #[serde(default)]
+    pub gap_ms: u64,
     /// The root mean square of how far who saw it was off its stand-off, mm.
     pub stand_off_rms_mm: u64,
     /// The root mean square of how far the target was from where it was said to be, mm.
@@ -70,6 +73,9 @@ impl Tracked {
         if self.twice_ms > 0 {
             words += &format!(", by two for {} s", self.twice_ms / 1000);
         }
+        if self.gap_ms > 0 {
+            words += &format!(", out of sight for {} s at most", self.gap_ms / 1000);
+        }
         for ms in &self.retaken_ms {
             words += &format!(", had again {} s after a loss", ms / 1000);
         }
@@ -91,6 +97,8 @@ struct Watched {
     last: Option<(u16, u64)>,
     /// When one that followed was lost, and nobody had it since.
     lost_ms: Option<u64>,
+    /// For how long nobody has had it in its picture, ms.
+    unseen_ms: u64,
 }
 
 /// One look at a target: the first UAV that follows it and has it in its picture, its errors,
@@ -248,6 +256,11 @@ impl Watched {
     ) {
         if self.told.first_ms.is_some() {
             self.told.wanted_ms += passed_ms;
+            self.unseen_ms += passed_ms;
+            if seen.is_some() {
+                self.unseen_ms = 0;
+            }
+            self.told.gap_ms = self.told.gap_ms.max(self.unseen_ms);
         }
         let Some(Seen {
             uav,
@@ -341,6 +354,7 @@ mod tests {
         let (broken, told) = after(60, &|_| look(1, 5, true, &[0]));
         assert!(!broken);
         assert_eq!((told.wanted_ms, told.sight_ms), (59_000, 59_000));
+        assert_eq!(told.gap_ms, 0);
         assert_eq!((told.stand_off_rms_mm, told.place_rms_mm), (5_000, 5_000));
         // Nothing in its picture; another place; too seldom.
         assert!(after(60, &|_| look(1, 5, true, &[])).0);
@@ -358,6 +372,7 @@ mod tests {
             look(1, 5, true, if t % 3 > 0 { &[0] } else { &[] })
         });
         assert!(!seldom.0 && seldom.1.sight_ms < 45_000);
+        assert_eq!(seldom.1.gap_ms, 1_000);
         // Who says that it searches may.
         assert!(!after(60, &|_| look(1, 5, false, &[])).0);
         // Nor is anything found in less than a window.
@@ -383,6 +398,8 @@ mod tests {
         assert_eq!(told.retaken_ms, [25_000]);
         assert_eq!((told.wanted_ms, told.sight_ms), (49_000, 25_000));
         assert!(told.words().contains("had again 25 s after a loss"));
+        assert_eq!(told.gap_ms, 24_000);
+        assert!(told.words().contains("out of sight for 24 s at most"));
     }
 
     #[test]

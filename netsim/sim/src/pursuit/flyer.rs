@@ -340,7 +340,8 @@ impl Flyer {
         if let Some(buildings) = town.buildings {
             let camera = &self.camera;
             let view = View {
-                sees: &|from, at| camera.would_see(from, at, buildings),
+                sees: &|from, at| camera.would_see(from.position(), at, buildings),
+                aside: &|_, _| Vector::zeros(),
                 reach_m: camera.reach_m(),
                 streets: town.streets,
             };

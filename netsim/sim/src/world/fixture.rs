@@ -183,6 +183,7 @@ fn mission(launch: Point, zone: Vec<PointMm>) -> Mission {
         tasks: Vec::new(),
         counts: Vec::new(),
         streets: None,
+        buildings: None,
         layers: None,
         crowd: None,
         tree: skein_flight::coverage::ring::Tree::default(),

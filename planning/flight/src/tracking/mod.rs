@@ -16,6 +16,7 @@
 //! | [`told`] | estimates in few numbers, for the radio | 3.7 |
 //! | [`chance`] | where a target that is out of sight may be, and where to look for it | 3.7 |
 //! | [`streets`] | where it is if it keeps to streets that are known | 3.7 |
+//! | [`buildings`] | whether a building stands before a target | 3.7.1 |
 //! | [`vantage`] | the circle from which buildings hide it least | 3.7.1 |
 //! | [`lookout`] | where to point a camera, and where to fly, by chances | 3.7 |
 //! | [`fusion`] | what all UAVs know of a target together | 3.7 |
@@ -26,6 +27,7 @@
 
 pub mod aside;
 pub mod bend;
+pub mod buildings;
 pub mod chance;
 pub mod estimate;
 pub mod field;

@@ -82,8 +82,10 @@ const ROOM: f64 = 1.03;
 /// What a follower knows of what it sees.
 #[derive(Clone, Copy)]
 pub struct View<'a> {
-    /// Whether from a place in its own height the ground at another place is seen.
-    pub sees: &'a dyn Fn(Point, Point) -> bool,
+    /// Whether from a pose in its own height the ground at a place is seen.
+    pub sees: &'a dyn Fn(Pose, Point) -> bool,
+    /// How far a circle of a radius, metres, about a place lies aside of it for zones.
+    pub aside: &'a dyn Fn(Point, f64) -> Vector,
     /// How far away over the ground its camera recognises a target, metres.
     pub reach_m: f64,
     /// Streets, where they are known.
@@ -235,14 +237,15 @@ impl<'a> Scene<'a> {
     fn worth(&self, circle: &Circle, stand_off_m: f64) -> f64 {
         let mut follower = self.follower.clone();
         follower.circle(Some(circle.radius_m));
-        let moves: Vec<TargetMotion> = self
-            .moves
-            .iter()
-            .map(|m| TargetMotion {
-                position: m.position + circle.beside,
+        let mut moves = Vec::with_capacity(self.moves.len());
+        for part in self.moves.chunks(PARTS) {
+            let middle = part[0].position + circle.beside;
+            let aside = (self.view.aside)(middle, circle.radius_m);
+            moves.extend(part.iter().map(|m| TargetMotion {
+                position: m.position + circle.beside + aside,
                 ..*m
-            })
-            .collect();
+            }));
+        }
         let step_s = SAMPLE_S / whole(PARTS);
         let flown = follower.ahead(self.pose, self.wind, step_s, &moves);
         let (mut seen, mut all) = (0.0, 0.0);
@@ -258,7 +261,7 @@ impl<'a> Scene<'a> {
                 // Ways are one until they part.
                 let sees = match before {
                     Some((same, sees)) if same == at => sees,
-                    _ => (at - from).norm() <= self.view.reach_m && (self.view.sees)(from, at),
+                    _ => (at - from).norm() <= self.view.reach_m && (self.view.sees)(*pose, at),
                 };
                 before = Some((at, sees));
                 seen += if sees { counts } else { 0.0 };
@@ -312,9 +315,14 @@ mod tests {
         }
     }
 
+    /// Where there are no zones.
+    fn free(_: Point, _: f64) -> Vector {
+        Vector::zeros()
+    }
+
     /// Whether the line of sight clears the fronts to both sides of the street.
-    fn canyon(from: Point, at: Point) -> bool {
-        let beside_m = (from.y - at.y).abs();
+    fn canyon(from: Pose, at: Point) -> bool {
+        let beside_m = (from.north_m - at.y).abs();
         if beside_m <= HALF_M {
             return true;
         }
@@ -323,7 +331,7 @@ mod tests {
 
     /// The share of sight over ten minutes after a target, by the circle that is chosen or by
     /// that of the stand-off, how often it changed, and the least radius.
-    fn flown(mps: f64, sees: &dyn Fn(Point, Point) -> bool, chooses: bool) -> (f64, u32, f64) {
+    fn flown(mps: f64, sees: &dyn Fn(Pose, Point) -> bool, chooses: bool) -> (f64, u32, f64) {
         let (mut follower, mut vantage) = (follower(), Vantage::default());
         let mut pose = Pose::new(Point::new(-150.0, 0.0), 1.0);
         let (mut seen, mut changes, mut least_m) = (0.0, 0, f64::INFINITY);
@@ -331,10 +339,11 @@ mod tests {
         for k in 0..3_000_u64 {
             #[allow(clippy::cast_precision_loss, reason = "some thousands")]
             let mut motion = target(Point::new(mps * 0.2 * k as f64, 0.0), mps);
-            seen += f64::from(u8::from(sees(pose.position(), motion.position))) / 3_000.0;
+            seen += f64::from(u8::from(sees(pose, motion.position))) / 3_000.0;
             if chooses {
                 let view = View {
                     sees,
+                    aside: &free,
                     reach_m: 219.0,
                     streets: None,
                 };
@@ -376,9 +385,10 @@ mod tests {
         // And again once what hid it is behind.
         let (mut vantage, follower) = (Vantage::default(), follower());
         let pose = Pose::new(Point::new(0.0, -150.0), 0.0);
-        let mut choose = |sees: &dyn Fn(Point, Point) -> bool, now_ms| {
+        let mut choose = |sees: &dyn Fn(Pose, Point) -> bool, now_ms| {
             let view = View {
                 sees,
+                aside: &free,
                 reach_m: 219.0,
                 streets: None,
             };
@@ -400,6 +410,7 @@ mod tests {
     fn a_target_of_no_number_and_a_place_beside_have_no_circle() {
         let view = View {
             sees: &|_, _| true,
+            aside: &free,
             reach_m: 219.0,
             streets: None,
         };

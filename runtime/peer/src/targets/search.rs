@@ -1,19 +1,23 @@
-//! The search for a target that nobody has seen for a while (D2.7 §3.7): where it may be by a
-//! map of chances, which of that was looked at, and where vehicles were seen to drive.
+//! The search for a target that nobody has seen for a while (D2.7 §3.7): where it may be by
+//! chances, on the streets that the mission tells or else on a map, which of that was looked at,
+//! and where vehicles were seen to drive.
 //!
 //! | event | what follows |
 //! |---|---|
 //! | a vehicle is seen to drive, by whomever | there is a way |
-//! | whom it follows is lost | a map of chances begins where it was seen last |
+//! | whom it follows is lost | chances begin where it was seen last: on the streets, where it was on one that is known |
 //! | nobody has seen it yet | likewise, about the task's place since it was asked for |
 //! | a second passes | chance drives on; what is in view is less likely; where to look next is chosen |
-//! | it is seen again, or seen by another later | the map is dropped |
+//! | where it flies to stays out of view for longer than the way there takes | that is given up |
+//! | it is seen again, or seen by another later | the chances are dropped |
 
-use super::{Fused, INNER, Sought, Targets, standing};
+use super::{Fused, INNER, Sought, Targets, shows, standing};
 use skein_behaviors::Percept;
 use skein_behaviors::view::View;
 use skein_flight::tracking::chance::ChanceMap;
 use skein_flight::tracking::follower::TargetMotion;
+use skein_flight::tracking::lookout::{Looker, fly_to};
+use skein_flight::tracking::streets::{LastSeen, StreetChances, Streets};
 use skein_geometry::frame::{Point, Vector};
 
 /// Ways that were driven on are known in squares of this side, metres, and so many of them: all
@@ -32,15 +36,97 @@ const LOOK_MS: u64 = 1_000;
 /// metres.
 const ABOUT_M: f64 = 75.0;
 
+/// Who was seen to stand drives so fast once it drives, m/s: in a town.
+const USUAL_MPS: f64 = 8.0;
+
+/// What a look leaves of the chance that it is on a street that it showed after all: nine in ten
+/// are recognised, and looks that follow each other miss the same.
+const LEFT: f64 = 0.3;
+
+/// Who has not had the streets about a place in view after so many times the time of flight
+/// there, and so many seconds, never will; they reach so far around it, metres.
+const PATIENCE: f64 = 1.5;
+const PATIENCE_S: f64 = 15.0;
+const GIVEN_UP_M: f64 = 40.0;
+
 /// A search for a target that is out of sight.
 #[derive(Clone, Debug)]
 pub(super) struct Search {
     /// For which task, and when the target was seen last.
     of: (Sought, u64),
-    map: ChanceMap,
+    chances: Chances,
     looked_ms: u64,
     /// Where to fly.
     aim: Option<Point>,
+}
+
+/// Where a target may be.
+#[derive(Clone, Debug)]
+enum Chances {
+    /// On streets; and until when its search flies to its aim, milliseconds.
+    Streets(StreetChances, u64),
+    /// Anywhere on the ground.
+    Ground(Box<ChanceMap>),
+}
+
+/// One who searches, at a time, milliseconds.
+struct Searcher<'a> {
+    now_ms: u64,
+    looker: Looker,
+    /// Whether a vehicle at a place would be seen, and whether a place in the picture is a roof.
+    shows: &'a dyn Fn(Point) -> bool,
+    covers: &'a dyn Fn(Point) -> bool,
+    may_fly: &'a dyn Fn(Point) -> bool,
+}
+
+impl Chances {
+    /// A second passes: chance drives on, what is in view is less likely, and where to fly next
+    /// follows.
+    fn go_on(
+        &mut self,
+        streets: Option<&Streets>,
+        by: &Searcher<'_>,
+        aim: Option<Point>,
+    ) -> Option<Point> {
+        match (self, streets) {
+            (Self::Ground(map), _) => {
+                map.go_on(by.now_ms);
+                // Who keeps to no street is not within a house, whatever is seen of that.
+                map.look(&|p| (by.shows)(p) || (by.covers)(p));
+                map.look_next(by.looker.at, by.looker.airspeed_mps, by.may_fly)
+            }
+            (Self::Streets(chances, until_ms), Some(streets)) => {
+                chances.go_on(streets, by.now_ms);
+                chances.look(streets, LEFT, by.shows);
+                if let Some(at) = aim.filter(|_| *until_ms < by.now_ms) {
+                    let near = |p: Point| (p - at).norm() <= GIVEN_UP_M;
+                    chances.look(streets, LEFT, &near);
+                }
+                let mut places = chances.places(streets);
+                places.retain(|(at, _)| (by.may_fly)(*at));
+                let next = fly_to(&places, &by.looker, aim, &[]);
+                if next != aim {
+                    *until_ms = by.now_ms + next.map_or(0, |at| by.patience_ms(at));
+                }
+                next
+            }
+            (Self::Streets(..), None) => None,
+        }
+    }
+}
+
+impl Searcher<'_> {
+    /// For how long it may take to have a place in view, milliseconds.
+    fn patience_ms(&self, at: Point) -> u64 {
+        let flight_s = (at - self.looker.at).norm() / self.looker.airspeed_mps.max(1.0);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a cast of a float saturates"
+        )]
+        let ms = ((PATIENCE * flight_s + PATIENCE_S) * 1000.0) as u64;
+        ms
+    }
 }
 
 impl Targets {
@@ -65,32 +151,48 @@ impl Targets {
         let airframe = self.flies?;
         let last = self.bound.get(&sought).map(|b| b.last);
         let since_ms = last.map_or(0, |l| l.seen_ms);
-        let ways = &self.ways;
+        let (ways, town) = (&self.ways, self.town.as_deref());
         // A way is as wide as a square, and what is known of it ends between two looks.
         let is_driven = |p: Point| {
             let (east, north) = way_square(p);
             let near = |n: i16| n.saturating_sub(1)..=n.saturating_add(1);
             near(east).any(|e| near(north).any(|n| ways.contains(&(e, n))))
         };
+        let streets = town.and_then(|t| t.streets.as_ref());
         let goes_on = self.search.take().filter(|s| s.of == (sought, since_ms));
-        let mut search = goes_on.unwrap_or_else(|| Search {
-            of: (sought, since_ms),
-            map: match first_map(last, place, self.now_ms, asked_s) {
+        let mut search = goes_on.unwrap_or_else(|| {
+            let seen = last_seen(last, place, self.now_ms, asked_s);
+            let on_streets = streets.and_then(|s| StreetChances::new(s, &seen));
+            let on_ground = || match first_map(&seen) {
                 map if ways.is_empty() => map,
                 map => map.on_ways(&is_driven),
-            },
-            looked_ms: 0,
-            aim: None,
+            };
+            let chances = on_streets.map_or_else(
+                || Chances::Ground(Box::new(on_ground())),
+                |chances| Chances::Streets(chances, u64::MAX),
+            );
+            Search {
+                of: (sought, since_ms),
+                chances,
+                looked_ms: 0,
+                aim: None,
+            }
         });
         if search.looked_ms + LOOK_MS <= self.now_ms {
             search.looked_ms = self.now_ms;
-            let from = percept.pose;
-            search.map.go_on(self.now_ms);
             let view = View::of(percept, &airframe);
-            search.map.look(&|p| view.shows(p, INNER));
-            let speed_mps = airframe.cruise_mps;
-            let next = search.map.look_next(from.position(), speed_mps, may_fly);
-            search.aim = next;
+            let by = Searcher {
+                now_ms: self.now_ms,
+                looker: Looker {
+                    at: percept.pose.position(),
+                    airspeed_mps: airframe.cruise_mps,
+                    reach_m: airframe.footprint_across_m.min(airframe.footprint_along_m),
+                },
+                shows: &|p| shows(&view, percept, town, p),
+                covers: &|p| view.shows(p, INNER) && town.is_some_and(|t| t.buildings.cover(p)),
+                may_fly,
+            };
+            search.aim = search.chances.go_on(streets, &by, search.aim);
         }
         let aim = search.aim;
         self.search = Some(search);
@@ -113,12 +215,19 @@ fn way_square(p: Point) -> (i16, i16) {
     (nth(p.x), nth(p.y))
 }
 
-/// Where a target may be that was seen so last, or was to be about a place when it was asked
-/// for.
-fn first_map(last: Option<Fused>, place: Point, now_ms: u64, asked_s: f64) -> ChanceMap {
+/// What was known of a target when it was seen last, or that it was to be about a place when it
+/// was asked for.
+fn last_seen(last: Option<Fused>, place: Point, now_ms: u64, asked_s: f64) -> LastSeen {
     if let Some(f) = last {
         let e = f.estimate;
-        return ChanceMap::new(e.time_ms, e.position(), e.spread_m(), e.velocity_mps());
+        let mps = e.velocity_mps().norm();
+        return LastSeen {
+            at_ms: e.time_ms,
+            at: e.position(),
+            spread_m: e.spread_m(),
+            velocity_mps: e.velocity_mps(),
+            usual_mps: if mps >= DRIVES_MPS { mps } else { USUAL_MPS },
+        };
     }
     #[allow(
         clippy::cast_possible_truncation,
@@ -126,6 +235,16 @@ fn first_map(last: Option<Fused>, place: Point, now_ms: u64, asked_s: f64) -> Ch
         reason = "a cast of a float saturates"
     )]
     let asked_ms = (asked_s * 1000.0) as u64;
-    let begun_ms = now_ms.saturating_sub(asked_ms);
-    ChanceMap::new(begun_ms, place, ABOUT_M, Vector::zeros())
+    LastSeen {
+        at_ms: now_ms.saturating_sub(asked_ms),
+        at: place,
+        spread_m: ABOUT_M,
+        velocity_mps: Vector::zeros(),
+        usual_mps: USUAL_MPS,
+    }
+}
+
+/// The map of chances that begins there.
+fn first_map(seen: &LastSeen) -> ChanceMap {
+    ChanceMap::new(seen.at_ms, seen.at, seen.spread_m, seen.velocity_mps)
 }

@@ -2,6 +2,9 @@
 
 use super::*;
 use skein_behaviors::sightings::{Sighted, Sightings};
+use skein_flight::tracking::buildings::{Building, Buildings};
+use skein_flight::tracking::streets::Streets;
+use skein_geometry::Polygon;
 use skein_geometry::frame::Pose;
 
 const TASK: Sought = (
@@ -209,6 +212,75 @@ fn who_is_lost_is_looked_for_all_over_and_taken_up_again_where_it_may_be() {
     let place = Point::new(300.0, 300.0);
     let aim = other.look_for((TASK, place, 4.0), &looked, &|_| true);
     assert!((aim.unwrap().position - place).norm() < 100.0);
+}
+
+/// A street from west to east along y = 50, one across it at x = 300, and a house of 30 m beside
+/// the first.
+fn town(west_m: f64, south_m: f64) -> Arc<Town> {
+    let line = |ends: [(f64, f64); 3]| ends.map(|(x, y)| Point::new(x, y)).to_vec();
+    let corner = |x: f64, y: f64| Point::new(west_m + x, south_m + y);
+    let ring = [(0.0, 0.0), (40.0, 0.0), (40.0, 20.0), (0.0, 20.0)];
+    let house = Building {
+        footprint: Polygon::new(ring.map(|(x, y)| corner(x, y)).to_vec()).unwrap(),
+        roof_m: 30.0,
+    };
+    let along = line([(-200.0, 50.0), (300.0, 50.0), (900.0, 50.0)]);
+    let across = line([(300.0, -500.0), (300.0, 50.0), (300.0, 600.0)]);
+    Arc::new(Town {
+        buildings: Buildings::of([house]),
+        streets: Streets::of(&[along, across]),
+    })
+}
+
+#[test]
+fn who_is_lost_where_streets_are_told_is_looked_for_along_them_and_given_up_where_none_can_look() {
+    let mut one = targets(1);
+    one.knows(Some(&town(-900.0, -900.0)));
+    watched(&mut one, 1_000, 6_000);
+    one.follow(TASK, Point::new(125.0, 50.0), 0.0).unwrap();
+    let (mut at, mut places) = (Point::new(130.0, 50.0), Vec::<Point>::new());
+    for now_ms in (6_000..300_000).step_by(200) {
+        // It never comes so far that it sees the streets beyond: they are given up, not flown to
+        // for ever.
+        at.x = at.x.min(280.0);
+        let looked = percept(now_ms, at, &[]);
+        one.on_percept(&looked);
+        if !one.known(TASK).unwrap().is_lost() {
+            continue;
+        }
+        let looked_for = (TASK, Point::new(125.0, 50.0), 9.0);
+        let aim = one.look_for(looked_for, &looked, &|_| true).unwrap();
+        let to = aim.position - at;
+        at += to * (2.8 / to.norm().max(2.8));
+        let p = aim.position;
+        // To the middle of what a square of the flight holds, for there may be a crossing.
+        let off_m = (p.y - 50.0).abs().min((p.x - 300.0).abs());
+        assert!(off_m < 30.0, "{p:?} is on no street");
+        if places.last() != Some(&p) {
+            places.push(p);
+        }
+    }
+    let goes = |is_there: &dyn Fn(&Point) -> bool| places.iter().any(is_there);
+    assert!(places[0].x > 130.0, "ahead first: {:?}", places[0]);
+    assert!(goes(&|p| p.x > 400.0) && places.len() > 8, "{places:?}");
+}
+
+/// Who stands behind a house is not missed by who looks past it.
+#[test]
+fn a_track_behind_a_house_is_kept_and_one_in_the_open_is_not() {
+    // The house begins 2 m north of the car; the UAV is north of it, the car in its picture.
+    let kept = |town: Option<&Arc<Town>>| {
+        let mut one = targets(1);
+        one.knows(town);
+        watched(&mut one, 1_000, 6_000);
+        one.follow(TASK, Point::new(125.0, 50.0), 0.0).unwrap();
+        for now_ms in (6_000..8_400).step_by(200) {
+            one.on_percept(&percept(now_ms, Point::new(135.0, 76.0), &[]));
+        }
+        one.unseen_ms(TASK).is_some()
+    };
+    assert!(kept(Some(&town(110.0, 52.0))) && !kept(None));
+    assert!(!kept(Some(&town(-900.0, 52.0))));
 }
 
 #[test]

@@ -144,6 +144,7 @@ impl Tasking {
 
     /// A percept: what the camera saw, and where whom it follows is. Whether its goal changed.
     pub fn look(&mut self, now: Time, percept: &Percept, state: &mut MissionState) -> bool {
+        self.targets.knows(state.geometry.town.as_ref());
         self.targets.on_percept(percept);
         if !state.geometry.mission.detections.is_empty() && !percept.sightings.is_absent() {
             let (tracks, now_ms) = self.targets.tracks();
