@@ -52,3 +52,42 @@ fn what_uavs_say_of_what_they_see_is_judged_beside_what_is_true() {
     let streets = &report["streets"];
     assert!(streets["watched"][1].as_f64().unwrap() > 5.0, "{streets:#}");
 }
+
+/// A search whose bus stands near the base, and services that come from there.
+fn served(place: &Place) -> String {
+    let text = fs::read_to_string(root().join("configs/trials/search.json5")).unwrap();
+    let changes = [
+        (
+            "[[560, 520], [700, 560], [740, 640]]",
+            "[[400, 120], [540, 160], [580, 240]]",
+        ),
+        ("speed_mps: 1.5", "speed_mps: 5"),
+    ];
+    let changed = changes.iter().fold(text, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    });
+    place.file("served.json5", &changed)
+}
+
+/// Services drive to where the ground station knows what was found to be, and its operator says
+/// at its console that they are there: so it is over long before the time of the watch.
+#[test]
+fn what_was_found_is_watched_until_services_on_the_ground_are_there() {
+    let _alone = alone();
+    let place = Place::new();
+    let file = served(&place);
+    let (code, said) = place.skein(&["trial", &file, "--format", "json"]);
+    let mut said = serde_json::Deserializer::from_str(&said).into_iter::<Value>();
+    let report = said.next().unwrap().unwrap();
+    assert!(code == 0 && report["passed"] == true, "{report:#}");
+    let bus = &report["detections"][0];
+    let (told_ms, served_ms) = (bus["told_ms"].as_u64(), bus["served_ms"].as_u64());
+    let (told_ms, served_ms) = (told_ms.unwrap(), served_ms.unwrap());
+    assert!(
+        told_ms < served_ms && served_ms < told_ms + 200_000,
+        "{bus:#}"
+    );
+    let end_ms = report["end_ms"].as_u64().unwrap();
+    assert!(end_ms < served_ms + 60_000, "{end_ms} {bus:#}");
+}

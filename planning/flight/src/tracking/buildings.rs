@@ -91,15 +91,6 @@ impl Buildings {
         self.all.is_empty()
     }
 
-    /// Whether a place is within one of them.
-    #[must_use]
-    pub fn cover(&self, at: Point) -> bool {
-        let none = Vec::new();
-        let here = self.squares.get(&square(at)).unwrap_or(&none);
-        let mut here = here.iter().chain(&self.wide);
-        here.any(|n| self.all[*n as usize].is_met_by(at, at))
-    }
-
     /// Whether from a place, so many metres above the ground, one of them hides a vehicle that is
     /// at another place.
     #[must_use]
@@ -205,7 +196,6 @@ mod tests {
         // What is within it is below its roof, also from straight above.
         let inside = Point::new(20.0, 0.0);
         assert!(town.hide(inside, 100.0, inside));
-        assert!(town.cover(inside) && !town.cover(Point::new(9.0, 0.0)));
         for nowhere in [f64::NAN, f64::INFINITY] {
             assert!(!hides(nowhere, 30.0) && !hides(100.0, nowhere));
         }
@@ -217,7 +207,6 @@ mod tests {
         let town = Buildings::of([block(-15_000.0, -15_000.0, 30_000.0, 9.0)]);
         assert!(town.squares.is_empty());
         assert!(town.hide(Point::origin(), 80.0, Point::new(5.0, 5.0)));
-        assert!(town.cover(Point::origin()));
         let none = Buildings::default();
         assert!(!none.hide(Point::origin(), 80.0, Point::new(5.0, 5.0)));
     }

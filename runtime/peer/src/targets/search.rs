@@ -73,9 +73,10 @@ enum Chances {
 struct Searcher<'a> {
     now_ms: u64,
     looker: Looker,
-    /// Whether a vehicle at a place would be seen, and whether a place in the picture is a roof.
+    /// Whether a vehicle at a place would be seen, past all buildings.
     shows: &'a dyn Fn(Point) -> bool,
-    covers: &'a dyn Fn(Point) -> bool,
+    /// Whether a place is in the picture, whatever hides it.
+    pictures: &'a dyn Fn(Point) -> bool,
     may_fly: &'a dyn Fn(Point) -> bool,
 }
 
@@ -91,8 +92,10 @@ impl Chances {
         match (self, streets) {
             (Self::Ground(map), _) => {
                 map.go_on(by.now_ms);
-                // Who keeps to no street is not within a house, whatever is seen of that.
-                map.look(&|p| (by.shows)(p) || (by.covers)(p));
+                // Squares behind houses would keep their chance, and who searched stay with them
+                // for good: courts and back streets are most of a town, and who drives is in view
+                // sooner elsewhere.
+                map.look(by.pictures);
                 map.look_next(by.looker.at, by.looker.airspeed_mps, by.may_fly)
             }
             (Self::Streets(chances, until_ms), Some(streets)) => {
@@ -189,7 +192,7 @@ impl Targets {
                     reach_m: airframe.footprint_across_m.min(airframe.footprint_along_m),
                 },
                 shows: &|p| shows(&view, percept, town, p),
-                covers: &|p| view.shows(p, INNER) && town.is_some_and(|t| t.buildings.cover(p)),
+                pictures: &|p| view.shows(p, INNER),
                 may_fly,
             };
             search.aim = search.chances.go_on(streets, &by, search.aim);
