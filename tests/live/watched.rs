@@ -4,35 +4,46 @@ use crate::support::{Place, alone, root};
 use serde_json::Value;
 use std::fs;
 
-/// Two minutes above the four crossings, by three UAVs that all stay; a street is measured
-/// besides.
-fn crossings(place: &Place) -> String {
-    let text = fs::read_to_string(root().join("configs/trials/crossings.json5")).unwrap();
-    let streets = "streets: { ways_m: [[[150, 150], [550, 150]], [[150, 350], [550, 350]], \
-                   [[350, 150], [350, 350]]] },";
-    let changes = [
-        ("for_s: 900,", format!("for_s: 120, {streets}")),
-        ("count: 4, airframes", "count: 3, airframes".to_owned()),
-        ("{ at_s: 400, kind: \"kill\", peer: 3 },", String::new()),
-        ("max_kills: 3", "max_kills: 2".to_owned()),
-    ];
+/// A trial that is built in, with some of its text put otherwise, as a file of its own.
+fn changed(place: &Place, trial: &str, changes: &[(&str, &str)]) -> String {
+    let text = fs::read_to_string(root().join("configs/trials").join(trial)).unwrap();
     let changed = changes.iter().fold(text, |text, (from, to)| {
         assert!(text.contains(from), "{from}");
         text.replacen(from, to, 1)
     });
-    place.file("watched.json5", &changed)
+    place.file(trial, &changed)
+}
+
+/// What a trial reports, which passes.
+fn passed(place: &Place, file: &str) -> Value {
+    let (code, said) = place.skein(&["trial", file, "--format", "json"]);
+    // The report, and then what the trial told on its way.
+    let mut said = serde_json::Deserializer::from_str(&said).into_iter::<Value>();
+    let report = said.next().unwrap().unwrap();
+    assert!(code == 0 && report["passed"] == true, "{report:#}");
+    report
+}
+
+/// Two minutes above the four crossings, by three UAVs that all stay; a street is measured
+/// besides.
+fn crossings(place: &Place) -> String {
+    let streets = "streets: { ways_m: [[[150, 150], [550, 150]], [[150, 350], [550, 350]], \
+                   [[350, 150], [350, 350]]] },";
+    let shorter = format!("for_s: 120, {streets}");
+    let changes = [
+        ("for_s: 900,", shorter.as_str()),
+        ("count: 4, airframes", "count: 3, airframes"),
+        ("{ at_s: 400, kind: \"kill\", peer: 3 },", ""),
+        ("max_kills: 3", "max_kills: 2"),
+    ];
+    changed(place, "crossings.json5", &changes)
 }
 
 #[test]
 fn what_uavs_say_of_what_they_see_is_judged_beside_what_is_true() {
     let _alone = alone();
     let place = Place::new();
-    let file = crossings(&place);
-    let (code, said) = place.skein(&["trial", &file, "--format", "json"]);
-    // The report, and then what the trial told on its way.
-    let mut said = serde_json::Deserializer::from_str(&said).into_iter::<Value>();
-    let report = said.next().unwrap().unwrap();
-    assert!(code == 0 && report["passed"] == true, "{report:#}");
+    let report = passed(&place, &crossings(&place));
     let counts = report["counts"].as_array().unwrap();
     assert_eq!(counts.len(), 4, "{counts:#?}");
     let sum = |of: &dyn Fn(&Value) -> u64| counts.iter().map(of).sum::<u64>();
@@ -55,7 +66,6 @@ fn what_uavs_say_of_what_they_see_is_judged_beside_what_is_true() {
 
 /// A search whose bus stands near the base, and services that come from there.
 fn served(place: &Place) -> String {
-    let text = fs::read_to_string(root().join("configs/trials/search.json5")).unwrap();
     let changes = [
         (
             "[[560, 520], [700, 560], [740, 640]]",
@@ -63,11 +73,7 @@ fn served(place: &Place) -> String {
         ),
         ("speed_mps: 1.5", "speed_mps: 5"),
     ];
-    let changed = changes.iter().fold(text, |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replacen(from, to, 1)
-    });
-    place.file("served.json5", &changed)
+    changed(place, "search.json5", &changes)
 }
 
 /// Services drive to where the ground station knows what was found to be, and its operator says
@@ -76,11 +82,7 @@ fn served(place: &Place) -> String {
 fn what_was_found_is_watched_until_services_on_the_ground_are_there() {
     let _alone = alone();
     let place = Place::new();
-    let file = served(&place);
-    let (code, said) = place.skein(&["trial", &file, "--format", "json"]);
-    let mut said = serde_json::Deserializer::from_str(&said).into_iter::<Value>();
-    let report = said.next().unwrap().unwrap();
-    assert!(code == 0 && report["passed"] == true, "{report:#}");
+    let report = passed(&place, &served(&place));
     let bus = &report["detections"][0];
     let (told_ms, served_ms) = (bus["told_ms"].as_u64(), bus["served_ms"].as_u64());
     let (told_ms, served_ms) = (told_ms.unwrap(), served_ms.unwrap());

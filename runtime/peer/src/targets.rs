@@ -145,8 +145,8 @@ pub(crate) struct Targets {
     said_at: Time,
     /// Whom it looks for.
     search: Option<Search>,
-    /// Squares of [`WAY_M`] where vehicles were seen to drive, by whomever: since missions bring
-    /// no streets, these are what is known of them.
+    /// Squares of [`WAY_M`] where vehicles were seen to drive, by whomever: where
+    /// the mission tells no streets, these are what is known of them.
     ways: BTreeSet<(i16, i16)>,
     /// Buildings and streets, where the mission tells them.
     town: Option<Arc<Town>>,

@@ -34,11 +34,7 @@ pub(crate) fn read(
         .need("level_m", "45")?
         .number(1.0, MAX_HEIGHT_M, "metres")?;
     let margin_m = f.number_or("vertical_margin_m", 10.0, 0.0, MAX_HEIGHT_M, "metres")?;
-    let mut reader = Reader {
-        origin,
-        files,
-        shapes: BTreeMap::new(),
-    };
+    let mut reader = Reader::new(origin, files);
     let (area, asked) = reader.asked(f, notices)?;
     let mut zones = Vec::new();
     if let Some(list) = f.get("no_fly") {
@@ -86,12 +82,7 @@ pub(super) fn zone(
     files: &Files<'_>,
     notices: &mut Notices,
 ) -> Result<Vec<Polygon>, Error> {
-    let mut reader = Reader {
-        origin,
-        files,
-        shapes: BTreeMap::new(),
-    };
-    reader.zones(node, notices)
+    Reader::new(origin, files).zones(node, notices)
 }
 
 /// The buildings of a node that says from which file, which counts from the scenario's place.
@@ -101,12 +92,7 @@ pub(super) fn buildings(
     files: &Files<'_>,
     notices: &mut Notices,
 ) -> Result<Vec<Building>, Error> {
-    let reader = Reader {
-        origin,
-        files,
-        shapes: BTreeMap::new(),
-    };
-    reader.buildings(node, notices)
+    Reader::new(origin, files).buildings(node, notices)
 }
 
 /// Whether nothing of the area sticks out of the zone.
@@ -159,7 +145,15 @@ struct Reader<'f> {
     shapes: BTreeMap<String, FileShapes>,
 }
 
-impl Reader<'_> {
+impl<'f> Reader<'f> {
+    fn new(origin: Origin, files: &'f Files<'f>) -> Self {
+        Self {
+            origin,
+            files,
+            shapes: BTreeMap::new(),
+        }
+    }
+
     /// The area, and what is to be seen in it. Targets need no area of their own.
     fn asked(&mut self, f: &Fields<'_>, notices: &mut Notices) -> Result<(Polygon, Asked), Error> {
         let listed = f.get("points").or(f.get("lines"));

@@ -122,13 +122,7 @@ impl Searcher<'_> {
     /// For how long it may take to have a place in view, milliseconds.
     fn patience_ms(&self, at: Point) -> u64 {
         let flight_s = (at - self.looker.at).norm() / self.looker.airspeed_mps.max(1.0);
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a cast of a float saturates"
-        )]
-        let ms = ((PATIENCE * flight_s + PATIENCE_S) * 1000.0) as u64;
-        ms
+        whole_ms(PATIENCE * flight_s + PATIENCE_S)
     }
 }
 
@@ -232,19 +226,22 @@ fn last_seen(last: Option<Fused>, place: Point, now_ms: u64, asked_s: f64) -> La
             usual_mps: if mps >= DRIVES_MPS { mps } else { USUAL_MPS },
         };
     }
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a cast of a float saturates"
-    )]
-    let asked_ms = (asked_s * 1000.0) as u64;
     LastSeen {
-        at_ms: now_ms.saturating_sub(asked_ms),
+        at_ms: now_ms.saturating_sub(whole_ms(asked_s)),
         at: place,
         spread_m: ABOUT_M,
         velocity_mps: Vector::zeros(),
         usual_mps: USUAL_MPS,
     }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a cast of a float saturates"
+)]
+fn whole_ms(seconds: f64) -> u64 {
+    (seconds * 1000.0) as u64
 }
 
 /// The map of chances that begins there.
