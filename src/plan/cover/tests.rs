@@ -32,12 +32,16 @@ fn a_field_with_a_hole_and_a_zone_is_planned_in_every_form() {
     let alone: Value = serde_json::from_str(&told(&dir, FIELD, &["--exact"]).unwrap()).unwrap();
     assert_eq!(alone["flights"].as_array().unwrap().len(), 1);
     assert!(alone["cells"].as_u64().unwrap() >= 4);
-    let three = ["--exact", "--k", "3", "--format", "geojson"];
+    let three = [
+        "--exact", "--k", "3", "--steps", "500", "--format", "geojson",
+    ];
     let map: Value = serde_json::from_str(&told(&dir, FIELD, &three).unwrap()).unwrap();
     assert!(map["features"].as_array().unwrap().len() > 6);
     assert!(map["makespan_s"].as_f64() < alone["makespan_s"].as_f64());
     let out = dir.join("plans").display().to_string();
-    let split = ["--exact", "--k", "2", "--format", "plan", "--out", &out];
+    let split = [
+        "--exact", "--k", "2", "--steps", "500", "--format", "plan", "--out", &out,
+    ];
     assert!(told(&dir, FIELD, &split).unwrap().contains("uav-2.plan"));
     let text = std::fs::read_to_string(dir.join("plans/uav-1.plan")).unwrap();
     assert!(skein_interop::plan::read(&text).unwrap().waypoints.len() > 4);
@@ -70,7 +74,7 @@ fn a_field_with_a_hole_and_a_zone_is_planned_in_every_form() {
 fn both_planners_are_told_side_by_side() {
     let dir = std::env::temp_dir().join(format!("skein-plan-both-{}", std::process::id()));
     std::fs::create_dir_all(&dir).unwrap();
-    let flags = ["--k", "3", "--turn-radius-m", "25"];
+    let flags = ["--k", "3", "--turn-radius-m", "25", "--steps", "500"];
     let both: Value = serde_json::from_str(&told(&dir, FIELD, &flags).unwrap()).unwrap();
     let compared = both["compared"].as_array().unwrap();
     assert_eq!(compared.len(), 2);
@@ -84,7 +88,14 @@ fn both_planners_are_told_side_by_side() {
     std::fs::write(&fleet, text).unwrap();
     let fleet = fleet.display().to_string();
     for planner in ["--exact", "--approximate"] {
-        let turn = ["--turn-radius-m", "15", "--lanes", "common"];
+        let turn = [
+            "--turn-radius-m",
+            "15",
+            "--lanes",
+            "common",
+            "--steps",
+            "500",
+        ];
         let flags = [&[planner, "--fleet", &fleet][..], &turn].concat();
         let told: Value = serde_json::from_str(&told(&dir, FIELD, &flags).unwrap()).unwrap();
         let fast = &told["flights"][1];
