@@ -92,7 +92,7 @@ pub enum NoWay {
     #[error("no mission is held here yet")]
     Mission,
     /// Nobody was told of streets.
-    #[error("the mission brings no streets (mission.streets)")]
+    #[error("the mission brings no streets, or none whose use is measured (mission.streets)")]
     Streets,
     /// A place is far from all of them.
     #[error("it would {0} more than {REACH_M} m from the mission's streets")]

@@ -979,7 +979,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 51] = [
+        let changes: [fn(&mut Mission); 52] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -1037,6 +1037,11 @@ mod tests {
             |m| {
                 let mut streets = crate::streets::tests::block();
                 streets.ways[0].places[1].0 += 1;
+                m.streets = Some(Arc::new(streets));
+            },
+            |m| {
+                let mut streets = crate::streets::tests::block();
+                streets.unmeasured = true;
                 m.streets = Some(Arc::new(streets));
             },
             |m| m.layers = Some(Arc::new(crate::layers::tests::three())),

@@ -2,13 +2,14 @@
 //! with the same numbers. Who sees what drives there is [`crate::usage`]'s, and which way is
 //! quickest [`crate::hint`]'s.
 
-use crate::mission::{PointMm, is_default, point_m};
+use crate::mission::{Mission, PointMm, is_default, point_m};
 use crate::wire::limits::POSITION_MAX_MM;
 use crate::wire::usage::{INTERVALS_MAX, STRETCHES_MAX, TURNS_MAX};
 use serde::{Deserialize, Serialize};
 use skein_flight::streets::Network;
 use skein_geometry::frame::Point;
 use skein_geometry::hash::Fnv;
+use std::sync::Arc;
 
 /// Most lines of a mission: each crossing of a stretch may cut one.
 pub const WAYS_MAX: usize = 256;
@@ -68,6 +69,17 @@ pub struct Streets {
     /// Where emergency vehicles set out for what is detected, mm.
     #[serde(default, skip_serializing_if = "is_default")]
     pub station: Option<PointMm>,
+    /// Where these are: nobody measures how they are used. Who follows a vehicle goes by them.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub unmeasured: bool,
+}
+
+impl Mission {
+    /// The streets whose use is measured.
+    #[must_use]
+    pub fn measured_streets(&self) -> Option<&Arc<Streets>> {
+        self.streets.as_ref().filter(|s| !s.unmeasured)
+    }
 }
 
 impl Streets {
@@ -186,7 +198,18 @@ impl Streets {
         if self.station.as_ref().is_some_and(far) {
             return Err(("station".into(), text()));
         }
-        Ok(())
+        let hinted = [
+            ("asked", !self.asked.is_empty()),
+            ("station", self.station.is_some()),
+        ];
+        match hinted.iter().find(|(_, told)| *told && self.unmeasured) {
+            Some((what, _)) => Err((
+                (*what).into(),
+                "leads by measured speeds; expected none where the use of streets is not measured"
+                    .into(),
+            )),
+            None => Ok(()),
+        }
     }
 
     /// Folds what is counted by into a hash: which ways are asked for changes nothing of that.
@@ -217,6 +240,9 @@ impl Streets {
         if let Some(station) = self.station {
             h.write_i64(-1);
             hash_place(h, station);
+        }
+        if self.unmeasured {
+            h.write_i64(-2);
         }
     }
 }
@@ -260,6 +286,7 @@ pub(crate) mod tests {
                 to: (200_000, 100_000),
             }],
             station: None,
+            unmeasured: false,
         }
     }
 

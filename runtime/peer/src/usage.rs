@@ -172,7 +172,7 @@ impl Using {
 
     /// The streets of the mission.
     fn follow(&mut self, mission: &Mission) {
-        let Some(streets) = &mission.streets else {
+        let Some(streets) = mission.measured_streets() else {
             if self.followed.take().is_some() {
                 self.clear_own();
             }
@@ -398,9 +398,9 @@ impl Using {
         self.known.hear(key, usage, of);
     }
 
-    /// What all together saw, as far as is known here; none without streets.
+    /// What all together saw, as far as is known here; none without streets to measure.
     pub fn sums(&self, mission: &Mission) -> Option<Usages> {
-        let streets = mission.streets.as_ref()?;
+        let streets = mission.measured_streets()?;
         let of = mission.streets_hash();
         let network = match &self.followed {
             Some(f) if f.of == of => Arc::clone(&f.network),

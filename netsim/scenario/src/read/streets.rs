@@ -72,6 +72,7 @@ pub(crate) fn of_mission(
         "usual_mps",
         "asked",
         "station",
+        "measure",
     ])?;
     let (at, lines) = match (f.get("file"), f.get("ways_m")) {
         (Some(file), None) => (file, of_file(file, (origin, files), area, notices)?),
@@ -99,6 +100,7 @@ pub(crate) fn of_mission(
         None => Vec::new(),
     };
     let station = f.get("station").map(place).transpose()?;
+    let measure = f.get("measure").map_or(Ok(true), Node::flag)?;
     let streets = Streets {
         names,
         ways,
@@ -106,6 +108,7 @@ pub(crate) fn of_mission(
         usual_dmps,
         asked,
         station,
+        unmeasured: !measure,
     };
     match streets.check() {
         Ok(()) => Ok(Some(Arc::new(streets))),
@@ -188,6 +191,9 @@ mod tests {
         assert_eq!(streets.names, ["South", "street 2", "street 3"]);
         assert_eq!((streets.interval_s, streets.usual_dmps), (60, 80));
         assert_eq!(streets.network().edges().len(), 3);
+        assert!(!streets.unmeasured);
+        let known = with(&format!("{{ {ways}, measure: false }}")).unwrap();
+        assert!(known.streets.is_some() && known.measured_streets().is_none());
         let town = with("{ file: '../data/helsinki_roads.geojson' }");
         // The default area is larger than a mission's streets may be.
         let said = town.map(|m| m.streets.as_ref().map(|s| s.network().edges().len()));
@@ -217,6 +223,14 @@ mod tests {
             (
                 format!("{{ {ways}, names: ['a', 'b', 'c', 'd'] }}"),
                 "a way for each name",
+            ),
+            (
+                format!("{{ {ways}, measure: false, station: {{ east_m: 0, north_m: 0 }} }}"),
+                "mission.streets.station: station leads by measured speeds",
+            ),
+            (
+                format!("{{ {ways}, measure: 2 }}"),
+                "mission.streets.measure",
             ),
             (
                 "{ file: 'none.geojson' }".to_owned(),

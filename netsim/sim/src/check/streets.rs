@@ -123,7 +123,7 @@ pub struct StreetCheck {
 impl StreetCheck {
     /// The operator has a mission.
     pub fn on_mission(&mut self, mission: &Mission) {
-        let Some(streets) = &mission.streets else {
+        let Some(streets) = mission.measured_streets() else {
             *self = Self::default();
             return;
         };
@@ -143,7 +143,7 @@ impl StreetCheck {
         self.streets = Some((Arc::clone(streets), network));
     }
 
-    /// Whether the mission has no streets.
+    /// Whether the mission has no streets to measure.
     #[must_use]
     pub fn is_idle(&self) -> bool {
         self.streets.is_none()

@@ -103,14 +103,14 @@ fn courses_that_are_planned_at_once_give_the_same_plan_again() {
 
 #[test]
 fn both_planners_are_told_side_by_side() {
-    let mut slow = uav("slow", swath(40.0));
-    let mut fast = uav("fast", swath(60.0));
+    let mut slow = uav("slow", swath(80.0));
+    let mut fast = uav("fast", swath(120.0));
     (slow.speed_mps, fast.speed_mps) = (10.0, 20.0);
     (slow.turn_radius_m, fast.turn_radius_m) = (15.0, 15.0);
     fast.endurance_s = Some(400.0);
     fast.start = Point::new(750.0, 0.0);
     let mut asked = field(&[slow, fast], Planner::Exact);
-    (asked.planners, asked.lanes, asked.steps) = (Planners::Both, Lanes::Common, 2_000);
+    (asked.planners, asked.lanes, asked.steps) = (Planners::Both, Lanes::Common, 300);
     let both = planned(&asked);
     let planners: Vec<Planner> = both.compared.iter().map(|f| f.planner).collect();
     assert_eq!(planners, PLANNERS);
@@ -172,7 +172,7 @@ fn unlike_swaths_get_sections_with_lanes_of_their_own() {
     team[0].turn_radius_m = 25.0;
     team[1].turn_radius_m = 15.0;
     for planner in PLANNERS {
-        let mut asked = request(rectangle(1500.0, 1100.0), &team, planner);
+        let mut asked = request(rectangle(750.0, 550.0), &team, planner);
         let plan = planned(&asked);
         assert_eq!(plan.figures.laid, Laid::Sections, "{planner:?}");
         let lanes: Vec<f64> = plan.uavs.iter().map(|u| u.lane_m.unwrap()).collect();
@@ -298,7 +298,7 @@ fn flights_that_meet_have_heights_and_see_as_wide_as_their_lanes() {
     let cameras = [fov(60.0), fov(60.0), fov(40.0)];
     let named = ["a", "b", "c"].iter().zip(cameras);
     let team: Vec<Uav> = named.map(|(name, camera)| uav(name, camera)).collect();
-    let mut asked = request(rectangle(900.0, 900.0), &team, Planner::Exact);
+    let mut asked = request(rectangle(600.0, 600.0), &team, Planner::Exact);
     asked.altitude_m = 80.0;
     let layered = planned(&asked);
     let highest = |plan: &AreaPlan| plan.uavs.iter().map(|u| u.altitude_m).fold(0.0, f64::max);
@@ -317,12 +317,12 @@ fn flights_that_meet_have_heights_and_see_as_wide_as_their_lanes() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(6))]
+    #![proptest_config(ProptestConfig::with_cases(3))]
 
     #[test]
     fn sections_see_all_and_the_best_is_never_later(
-        size in (400.0..1500.0f64, 400.0..1500.0f64),
-        uavs in prop::collection::vec((10.0..20.0f64, 25.0..90.0f64), 2..5),
+        size in (300.0..900.0f64, 300.0..900.0f64),
+        uavs in prop::collection::vec((10.0..20.0f64, 35.0..100.0f64), 2..5),
         turn in 10.0..40.0f64,
     ) {
         let one = |(i, &(speed_mps, width_m)): (usize, &(f64, f64))| Uav {
@@ -347,7 +347,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(6))]
+    #![proptest_config(ProptestConfig::with_cases(3))]
 
     /// Few lanes for many: who shares them is in the way of others.
     #[test]

@@ -36,7 +36,7 @@ impl Tasking {
     /// Heeds who else is above the sites, and tells what is to be told.
     pub(super) fn tell_of_counts(&mut self, s: &Situation<'_>, state: &MissionState) -> Effects {
         let mission = &state.geometry.mission;
-        let is_idle = mission.counts.is_empty() && mission.streets.is_none();
+        let is_idle = mission.counts.is_empty() && mission.measured_streets().is_none();
         let Some(airframe) = self.flies.filter(|_| !is_idle) else {
             return Effects::new();
         };

@@ -206,6 +206,21 @@ fn registers_are_told_one_at_a_time_and_merge_in_any_order() {
 }
 
 #[test]
+fn streets_that_are_known_alone_are_not_measured() {
+    let mut scene = Scene::new(Point::new(100.0, 100.0));
+    let mut known = block();
+    known.unmeasured = true;
+    scene.mission.streets = Some(Arc::new(known));
+    scene.look(10.0, &drives);
+    assert!(scene.using.own().is_none() && scene.using.sums(&scene.mission).is_none());
+    assert!(scene.mission.town().is_some_and(|t| t.streets.is_some()));
+    // The same streets measured from now on.
+    scene.mission.streets = Some(Arc::new(block()));
+    scene.look(10.0, &drives);
+    assert!(scene.own().watched_m_s() > 0);
+}
+
+#[test]
 fn another_sortie_and_another_life_begin_at_nothing() {
     let mut scene = Scene::new(Point::new(100.0, 100.0));
     scene.look(10.0, &drives);

@@ -35,6 +35,7 @@ fn streets() -> Streets {
             to: (200_000, 100_000),
         }],
         station: None,
+        unmeasured: false,
     }
 }
 
