@@ -979,7 +979,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 51] = [
+        let changes: [fn(&mut Mission); 53] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -1054,6 +1054,16 @@ mod tests {
             |m| {
                 let mut crowd = crate::crowd::tests::event();
                 crowd.dense_e2 += 1;
+                m.crowd = Some(Arc::new(crowd));
+            },
+            |m| {
+                let mut crowd = crate::crowd::tests::event();
+                crowd.then = crate::crowd::ThenWatch::Circle;
+                m.crowd = Some(Arc::new(crowd));
+            },
+            |m| {
+                let mut crowd = crate::crowd::tests::event();
+                (crowd.then, crowd.circles_max) = (crate::crowd::ThenWatch::Circle, 2);
                 m.crowd = Some(Arc::new(crowd));
             },
             |m| m.buildings = Some(Arc::new(crate::buildings::tests::houses(1))),

@@ -1,6 +1,10 @@
 //! The circle that is flown as a relay position (D2.7 §3.2, §2.3.1): around the place that was
 //! asked for, or as near to it as zones leave room, and nowhere farther from it than was asked.
 //!
+//! The circle above a place that is watched (D2.7 §3.1) is that from which the UAV's own camera holds
+//! the place for most of the round, of those as near and as wide. A camera that looks out of the
+//! belly looks outwards in a turn: then the place is not in the middle.
+//!
 //! # Guarantees
 //! The circle keeps the clearance of the mission, and a UAV that strays from it by the tracking
 //! error is still within the distance.
@@ -10,7 +14,11 @@
 
 use crate::mission::{Mission, point_m};
 use crate::wire::tasks::{Task, TaskKind};
+use core::f64::consts::FRAC_1_SQRT_2;
 use skein_behaviors::executive::circle::halves;
+use skein_behaviors::view::View;
+use skein_flight::airframe::Airframe;
+use skein_flight::coverage::ring::patch::Corners;
 use skein_flight::route::Router;
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::{FRAC_PI_2, TAU, cos, sin};
@@ -19,6 +27,12 @@ use skein_geometry::{NoFlyZones, Segment};
 /// Circles are flown with so many times the turn radius where there is room, so that following
 /// them has authority on both sides in a wind.
 const RADII: [f64; 2] = [1.2, 1.0];
+
+/// And with so many times that where the camera sees more of the place from there.
+const WATCH_RADII: [f64; 5] = [1.2, 1.0, 1.5, 2.0, 3.0];
+
+/// The picture is looked at so often in a round.
+const SHOTS: u32 = 24;
 
 /// Who is to follow a target that it does not see yet circles no farther than this from where it
 /// may be, metres.
@@ -38,7 +52,127 @@ fn circle_round(centre: Point, radius_m: f64) -> Segment {
     }
 }
 
+/// The camera that is to stay above a place, and how high.
+#[derive(Clone, Copy, Debug)]
+pub struct Eye {
+    /// Whose camera it is.
+    pub airframe: Airframe,
+    /// How high it flies, metres.
+    pub height_m: f64,
+    /// The side of the square that is watched, metres.
+    pub side_m: f64,
+}
+
+impl Eye {
+    /// For which share of a round on a circle, flown calm, the picture holds all of a square about
+    /// a place.
+    #[must_use]
+    pub fn share(&self, circle: &Segment, place: Point) -> f64 {
+        let half_m = self.side_m / 2.0;
+        let corner = |(x, y): (f64, f64)| place + Vector::new(x, y) * half_m;
+        let square: Corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(corner);
+        let holds = |k: &u32| {
+            let flown_m = circle.length_m * f64::from(*k) / f64::from(SHOTS);
+            let pose = Segment {
+                length_m: flown_m,
+                ..*circle
+            };
+            let view = View::turning(
+                pose.end(),
+                &self.airframe,
+                self.height_m,
+                circle.curvature_per_m,
+            );
+            view.holds(&square, 0.0, 0.0)
+        };
+        let held = u32::try_from((0..SHOTS).filter(holds).count()).unwrap_or(0);
+        f64::from(held) / f64::from(SHOTS)
+    }
+}
+
 impl Mission {
+    /// The circles within a distance of a place, nearest first for each radius.
+    fn circles_near(
+        &self,
+        (place, within_m): (Point, f64),
+        factors: &'static [f64],
+    ) -> impl Iterator<Item = Segment> {
+        let (turn_m, stray_m) = (self.turn_radius_m(), self.tracking_error_m());
+        let around = move |factor: &f64| {
+            let radius_m = factor * turn_m;
+            let room_m = within_m - radius_m - stray_m;
+            let rings = (0..=DISTANCES).filter(move |_| room_m >= 0.0);
+            let centres = rings.flat_map(move |ring| {
+                let away_m = room_m * f64::from(ring) / f64::from(DISTANCES);
+                let directions = if ring == 0 { 1 } else { DIRECTIONS };
+                (0..directions).map(move |k| {
+                    let course = TAU * f64::from(k) / f64::from(DIRECTIONS);
+                    place + Vector::new(cos(course), sin(course)) * away_m
+                })
+            });
+            centres.map(move |centre| circle_round(centre, radius_m))
+        };
+        factors.iter().flat_map(around)
+    }
+
+    /// How far from the middle of a square of this side whoever watches it may be, metres: on the
+    /// farthest circle the planned picture still holds it where the UAV passes it.
+    #[must_use]
+    pub fn watched_within_m(&self, side_m: f64) -> f64 {
+        let reach_m = self.level_reach_m(side_m).max(0.0);
+        2.0 * RADII[0] * self.turn_radius_m() + reach_m + self.tracking_error_m()
+    }
+
+    /// How far from the middle of a circle that is flown level squares of this side lie that the
+    /// planned picture holds all the way round, metres; below 0 where there are none.
+    #[must_use]
+    pub fn circled_reach_m(&self, side_m: f64) -> f64 {
+        let radius_m = RADII[0] * self.turn_radius_m();
+        let across_m = f64::from(self.footprint_across_mm) / 1000.0;
+        let along_m = f64::from(self.footprint_along_mm) / 1000.0;
+        let held_m = (across_m - radius_m).min(along_m);
+        held_m - side_m * FRAC_1_SQRT_2 - self.tracking_error_m()
+    }
+
+    /// The same from one place, whichever way the picture lies.
+    fn level_reach_m(&self, side_m: f64) -> f64 {
+        let half_mm = self.footprint_across_mm.min(self.footprint_along_mm);
+        f64::from(half_mm) / 1000.0 - side_m * FRAC_1_SQRT_2
+    }
+
+    /// The circle from which a camera watches a place, and for which share of a round it holds it.
+    ///
+    /// # Errors
+    /// A sentence that says why there is none.
+    pub fn watch_circle(
+        &self,
+        task: &Task,
+        zones: &NoFlyZones,
+        eye: &Eye,
+    ) -> Result<(Segment, f64), String> {
+        let place = task.places.first().ok_or("it has no place")?;
+        let place = point_m((place.east_mm, place.north_mm));
+        self.is_near_enough(place)?;
+        let within_m = f64::from(task.radius_mm) / 1000.0;
+        let clearance_m = self.clearance_m();
+        let mut best: Option<(Segment, f64)> = None;
+        for circle in self.circles_near((place, within_m), &WATCH_RADII) {
+            if best.is_some_and(|b| b.1 >= 1.0) {
+                break;
+            }
+            let share = eye.share(&circle, place);
+            let is_better = share > best.map_or(0.0, |b| b.1);
+            if is_better && zones.is_clear(&halves(&circle), clearance_m) {
+                best = Some((circle, share));
+            }
+        }
+        best.ok_or_else(|| {
+            format!(
+                "no circle within {within_m:.1} m of the place keeps {clearance_m:.1} m from the no-fly zones and has it in the camera"
+            )
+        })
+    }
+
     /// The circle of a relay position in this mission; of a target to follow that on which a UAV
     /// looks for it first.
     ///
@@ -60,21 +194,7 @@ impl Mission {
         }
         self.is_near_enough(place)?;
         let clearance_m = self.clearance_m();
-        let around = |factor: f64| {
-            let radius_m = factor * turn_m;
-            let room_m = within_m - radius_m - stray_m;
-            let rings = (0..=DISTANCES).filter(move |_| room_m >= 0.0);
-            let centres = rings.flat_map(move |ring| {
-                let away_m = room_m * f64::from(ring) / f64::from(DISTANCES);
-                let directions = if ring == 0 { 1 } else { DIRECTIONS };
-                (0..directions).map(move |k| {
-                    let course = TAU * f64::from(k) / f64::from(DIRECTIONS);
-                    place + Vector::new(cos(course), sin(course)) * away_m
-                })
-            });
-            centres.map(move |centre| circle_round(centre, radius_m))
-        };
-        let mut all = RADII.into_iter().flat_map(around);
+        let mut all = self.circles_near((place, within_m), &RADII);
         all.find(|c| zones.is_clear(&halves(c), clearance_m))
             .ok_or_else(|| {
                 format!(
@@ -110,10 +230,13 @@ impl Mission {
 pub fn planned(
     mission: &Mission,
     router: &Router,
-    task: &Task,
+    (task, eye): (&Task, Option<&Eye>),
     from: Pose,
 ) -> Result<Segment, String> {
-    let circle = mission.relay_circle(task, router.zones())?;
+    let circle = match eye {
+        Some(eye) => mission.watch_circle(task, router.zones(), eye)?.0,
+        None => mission.relay_circle(task, router.zones())?,
+    };
     // Who is nearer to a zone than that, since one came, gets away from it first.
     let is_clear = router.zones().distance_m(from.position()) >= mission.clearance_m();
     let no_way = |_| "no way leads to it that keeps clear of the no-fly zones".to_owned();
