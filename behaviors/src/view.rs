@@ -246,7 +246,10 @@ mod tests {
             (Mount::Fixed, 0.02, (false, true)),
             (Mount::Fixed, -0.02, (true, false)),
         ] {
-            let airframe = Airframe { mount, ..airframe() };
+            let airframe = Airframe {
+                mount,
+                ..airframe()
+            };
             let view = View::turning(pose, &airframe, 90.0, curvature_per_m);
             assert_eq!((view.shows(left, 1.0), view.shows(right, 1.0)), shows);
         }

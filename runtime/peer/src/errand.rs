@@ -268,7 +268,8 @@ impl Request {
     pub fn plan(&self) -> Result<Planned, String> {
         if self.task.is_held() {
             let (mission, router) = (&self.geometry.mission, &self.geometry.router);
-            let circle = relay_circle::planned(mission, router, (&self.task, self.eye.as_ref()), self.from)?;
+            let circle =
+                relay_circle::planned(mission, router, (&self.task, self.eye.as_ref()), self.from)?;
             return Ok(Planned::Circle(circle));
         }
         self.flight().map(Planned::Flight)

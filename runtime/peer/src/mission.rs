@@ -3,7 +3,7 @@
 use crate::buildings::Buildings;
 use crate::count_site::{CountSite, SITES_MAX};
 use crate::criteria::{CRITERIA_MAX, Criterion};
-use crate::crowd::CrowdWatch;
+use crate::crowd::{CrowdWatch, ThenWatch};
 use crate::diagram::{Diagram, DiagramError, Machine, check};
 use crate::input::NewTask;
 use crate::layers::Layers;
@@ -544,6 +544,19 @@ impl Mission {
         };
         let wrong = |(field, text)| GeometryError::Crowd(field, text);
         crowd.check().map_err(wrong)?;
+        if crowd.then == ThenWatch::Circle {
+            let refused = |text: &str| Err(GeometryError::Crowd("then", text.to_owned()));
+            if self.separation_mm > 0 {
+                return refused(
+                    "is \"circle\", and no tasks are flown where UAVs are kept apart by agreement: expected \"notify\", or heights of their own",
+                );
+            }
+            if !self.machine()?.relays() {
+                return refused(
+                    "is \"circle\", and no state of the diagram has the goal \"relay\": expected one, or \"notify\"",
+                );
+            }
+        }
         let area = Polygon::new(self.area_m()).map_err(GeometryError::Area)?;
         let half_mm = self.footprint_across_mm.min(self.footprint_along_mm);
         let overlap_m = if self.task.is_area() {

@@ -249,9 +249,10 @@ pub fn planned(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::mission;
+    use crate::testing::{airframe, mission};
     use crate::wire::tasks::TaskPlace;
     use skein_behaviors::executive::circle::centre;
+    use skein_flight::mount::{Gimbal, Mount};
     use std::sync::Arc;
 
     fn zoned() -> Mission {
@@ -307,6 +308,78 @@ mod tests {
             let radius = 1.0 / circle.curvature_per_m;
             assert!(radius >= m.turn_radius_m());
             assert!(away_m + radius + m.tracking_error_m() <= f64::from(radius_m) + 1e-6);
+        }
+    }
+
+    /// A camera as high as half its picture is wide, which sees 60 m to every side.
+    fn eye(mount: Mount) -> Eye {
+        Eye {
+            airframe: Airframe {
+                footprint_across_m: 60.0,
+                footprint_along_m: 60.0,
+                mount,
+                ..airframe()
+            },
+            height_m: 60.0,
+            side_m: 20.0,
+        }
+    }
+
+    #[test]
+    fn a_place_is_watched_from_where_the_camera_holds_it_longest() {
+        let mut m = zoned();
+        (m.footprint_across_mm, m.footprint_along_mm) = (60_000, 60_000);
+        let zones = m.no_fly_zones().unwrap();
+        let within_m = m.watched_within_m(20.0);
+        let watched = |(east_m, north_m): (i32, i32), mount| {
+            let mut task = relay(east_m, north_m, 0);
+            task.radius_mm = crate::mission::mm(within_m).unsigned_abs();
+            let (circle, share) = m.watch_circle(&task, &zones, &eye(mount)).unwrap();
+            let place = Point::new(f64::from(east_m), f64::from(north_m));
+            assert!(zones.is_clear(&halves(&circle), m.clearance_m() - 1e-6));
+            assert!((centre(&circle) - place).norm() + 1.0 / circle.curvature_per_m < within_m);
+            ((centre(&circle) - place).norm(), share)
+        };
+        let gimbal = Mount::Gimbal(Gimbal {
+            roll_rad: 0.8,
+            pitch_rad: 0.5,
+            rate_radps: 1.0,
+        });
+        for mount in [Mount::Level, gimbal] {
+            let (off_m, share) = watched((100, 200), mount);
+            assert!(off_m < 0.1 && share >= 1.0, "{off_m} {share}");
+        }
+        // Out of the belly it looks away from the middle.
+        let (off_m, share) = watched((100, 200), Mount::Fixed);
+        assert!(
+            off_m > 10.0 && (0.3..1.0).contains(&share),
+            "{off_m} {share}"
+        );
+        let place = Point::new(100.0, 200.0);
+        let middle = circle_round(place, 1.2 * m.turn_radius_m());
+        assert!(eye(Mount::Fixed).share(&middle, place) < share);
+        // Beside the zone, and in it.
+        let (off_m, share) = watched((190, 130), Mount::Level);
+        assert!(off_m > 10.0 && share > 0.6, "{off_m} {share}");
+        let (off_m, share) = watched((230, 130), Mount::Level);
+        assert!(off_m > 50.0 && share > 0.0, "{off_m} {share}");
+    }
+
+    #[test]
+    fn what_a_circle_holds_is_in_the_picture_all_the_way_round() {
+        let mut m = zoned();
+        (m.footprint_across_mm, m.footprint_along_mm) = (80_000, 60_000);
+        let reach_m = m.circled_reach_m(20.0);
+        assert!((30.0..40.0).contains(&reach_m), "{reach_m}");
+        let mut eye = eye(Mount::Level);
+        eye.airframe.footprint_across_m = 80.0;
+        let middle = circle_round(Point::new(0.0, 0.0), 1.2 * m.turn_radius_m());
+        for course in 0..12 {
+            let course = TAU * f64::from(course) / 12.0;
+            let off = Vector::new(cos(course), sin(course));
+            let share = |away_m: f64| eye.share(&middle, Point::new(0.0, 0.0) + off * away_m);
+            assert!(share(reach_m) >= 1.0);
+            assert!(share(reach_m + 20.0) < 1.0);
         }
     }
 

@@ -409,7 +409,11 @@ impl Tasking {
             effects.extend(self.tell_of_tasks(s));
             effects.extend(self.tell_of_event(s, state));
             let circles = self.derive_circles(s, state);
-            effects.extend(circles.into_iter().filter(|e| !matches!(e, Effect::Negotiate)));
+            effects.extend(
+                circles
+                    .into_iter()
+                    .filter(|e| !matches!(e, Effect::Negotiate)),
+            );
             return effects;
         }
         let geometry = std::sync::Arc::clone(&state.geometry);

@@ -176,7 +176,8 @@ impl CrowdCheck {
         }
         let dense = look.known.sectors().filter(|(_, s)| s.dense().is_some());
         let dense: Vec<u16> = dense.map(|(n, _)| n).collect();
-        self.circles.on_look(now_ms, look.uav.0, &look.picture, &dense);
+        self.circles
+            .on_look(now_ms, look.uav.0, &look.picture, &dense);
         let watcher = self.watchers.entry(look.uav).or_default();
         let second_ms = now_ms / 1_000 * 1_000;
         let since = |s: &Sector, ms: u64| s.look.is_some_and(|l| l.seen_ms + ms >= second_ms);

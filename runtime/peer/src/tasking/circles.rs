@@ -100,7 +100,10 @@ fn wanted(
         let Some(seed) = longest.map(|(n, _)| *n) else {
             break;
         };
-        let held = |above: u16| free.keys().filter(move |n| reach.apart(above, **n).is_some());
+        let held = |above: u16| {
+            free.keys()
+                .filter(move |n| reach.apart(above, **n).is_some())
+        };
         let near = reach.watch.sectors();
         let near = near.filter_map(|n| Some((n, reach.apart(n, seed)?)));
         let mut near: Vec<(Reverse<usize>, u32, u16)> = near
@@ -182,7 +185,10 @@ impl Tasking {
             circles.extend(tasks);
         }
         let stays = |id: &TaskId, task: &Task| circles.get(id) == Some(task);
-        let known = self.known.iter().filter(|(id, _)| sector_of(**id).is_some());
+        let known = self
+            .known
+            .iter()
+            .filter(|(id, _)| sector_of(**id).is_some());
         let over = known.filter(|(id, k)| !stays(id, &k.task));
         let over: Vec<TaskId> = over.map(|(id, _)| *id).collect();
         let mut effects = Effects::new();
@@ -235,7 +241,11 @@ impl Tasking {
         let begun: Vec<u16> = begun.map(|(n, _)| n).collect();
         let reach = Reach::of(watch, mission);
         let holds = |n: &u16| begun.iter().any(|above| reach.apart(*above, *n).is_some());
-        self.gathering.dense().map(|(n, _)| n).filter(holds).collect()
+        self.gathering
+            .dense()
+            .map(|(n, _)| n)
+            .filter(holds)
+            .collect()
     }
 
     /// By which camera a task is watched; none where nothing is.
@@ -246,5 +256,69 @@ impl Tasking {
             height_m: self.circles.height_m,
             side_m: f64::from(mission.crowd.as_ref()?.sector_m),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::crowd::tests::event;
+
+    /// Sectors too dense since when, and circles that somebody is to fly: above which others are.
+    fn above(
+        circles_max: u16,
+        dense: &[(u16, u64)],
+        claimed: &[(u16, Progress)],
+        no_room: &[u16],
+    ) -> Vec<u16> {
+        let watch = CrowdWatch {
+            cols: 12,
+            rows: 4,
+            then: ThenWatch::Circle,
+            circles_max,
+            ..event()
+        };
+        let reach = Reach {
+            watch: &watch,
+            reach_m: 29.0,
+        };
+        let (dense, claimed) = (dense.iter().copied(), claimed.iter().copied());
+        let mut room = |n: u16| !no_room.contains(&n);
+        let all = wanted(&reach, &dense.collect(), &claimed.collect(), &mut room);
+        all.into_iter().collect()
+    }
+
+    /// Numbers are those of tiles of four by four: 0 to 3 lie beside each other, 4 is above 0.
+    #[test]
+    fn one_circle_holds_what_is_together_and_others_wait_for_their_turn() {
+        assert_eq!(above(1, &[], &[], &[]), [0; 0]);
+        assert_eq!(above(1, &[(5, 10)], &[], &[]), [5]);
+        // Around 5 lie all of these; around 0, which is so longest, but three.
+        let all = [(0, 10), (1, 20), (4, 20), (6, 20), (10, 20)];
+        assert_eq!(above(1, &all, &[], &[]), [5]);
+        // What is far away has a circle of its own where the mission says two, the longest first.
+        let two = [(0, 10), (1, 20), (34, 5)];
+        assert_eq!(above(1, &two, &[], &[]), [34]);
+        assert_eq!(above(2, &two, &[], &[]), [0, 34]);
+        assert_eq!(above(8, &two, &[], &[]), [0, 34]);
+    }
+
+    #[test]
+    fn what_somebody_is_to_circle_stays_until_all_of_it_has_eased() {
+        use Progress::{Begun, Committed};
+        let two = [(1, 20), (34, 5)];
+        assert_eq!(above(1, &two, &[(0, Begun)], &[]), [0]);
+        assert_eq!(above(1, &[(34, 5)], &[(0, Begun)], &[]), [34]);
+        assert_eq!(above(1, &[], &[(0, Begun)], &[]), [0; 0]);
+        // Of two who came together the one that is there stays.
+        let both = [(0, Committed), (5, Begun)];
+        assert_eq!(above(2, &[(1, 20)], &both, &[]), [5]);
+    }
+
+    #[test]
+    fn where_no_circle_has_room_another_is_taken_or_none() {
+        assert_eq!(above(1, &[(5, 10)], &[], &[5]), [1]);
+        let around = [0, 1, 2, 4, 5, 6, 8, 9, 10];
+        assert_eq!(above(1, &[(5, 10), (34, 20)], &[], &around), [34]);
     }
 }

@@ -79,7 +79,10 @@ impl Tasking {
     fn leave_eased(&mut self, s: &Situation<'_>, mission: &Mission, looks: bool) -> Effects {
         let circled = self.circled(s, mission);
         let dense = self.gathering.dense().map(|(n, _)| n);
-        let dense: Vec<u16> = dense.filter(|n| !circled.contains(n)).map(register).collect();
+        let dense: Vec<u16> = dense
+            .filter(|n| !circled.contains(n))
+            .map(register)
+            .collect();
         let own = self.known.iter().filter(|(id, k)| {
             let is_look = (FIRST..TASKS_MAX).contains(&id.number);
             id.author == self.me && is_look && k.is_open()

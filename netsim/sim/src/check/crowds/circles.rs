@@ -39,6 +39,9 @@ const WAYS: u64 = 3;
 /// From when a UAV is given a circle to when it flies there, milliseconds.
 const SET_OUT_MS: u64 = 60_000;
 
+/// Who has not the fuel for so long there need not go, milliseconds.
+const STAY_MS: u64 = 180_000;
+
 /// No circle is wider than so many turn radii.
 const WIDEST: f64 = 3.0;
 
@@ -171,9 +174,10 @@ impl CircleCheck {
         self.watched.dense_ms += step_ms * count(dense.len());
         let pictured = dense.intersection(&in_picture).count();
         self.watched.pictured_ms += step_ms * count(pictured);
-        let circles = uavs
-            .iter()
-            .any(|m| circle_of(m).is_some_and(|p| is_there(p)) && dense.iter().any(|n| in_picture.contains(n)));
+        let circles = uavs.iter().any(|m| {
+            circle_of(m).is_some_and(|p| is_there(p))
+                && dense.iter().any(|n| in_picture.contains(n))
+        });
         if dense.is_empty() {
             (self.waits_ms, self.circles_now) = (None, false);
             return;
@@ -225,18 +229,26 @@ impl CircleCheck {
             let round_ms = Self::round_ms(flyers.get(&m.id));
             circle_of(m).is_some_and(is_there) && self.has_pictured(now_ms, m, round_ms)
         });
-        if able.len() < 2 || places.is_empty() || circles {
+        let farthest_ms = |m: &PeerSnapshot| {
+            let (at, flyer) = (m.at?, flyers.get(&m.id)?);
+            let ways = places.iter();
+            ways.map(|p| flight.longest_home_ms(at, *p, *flyer)).max()
+        };
+        // Who has its section to fly keeps the fuel for that.
+        let has_fuel = |m: &&PeerSnapshot| {
+            let needs_ms = 2 * farthest_ms(m).unwrap_or(u64::MAX / 4) + STAY_MS;
+            u64::from(m.view.spendable_ms) >= u64::from(m.eta_ms) + needs_ms
+        };
+        let could = able.len() > 1 && able.iter().any(|m| has_fuel(m));
+        if !could || places.is_empty() || circles {
             return;
         }
         seen.insert(here.key);
         let began_ms = self.none.start(here.key, now_ms);
         let from_ms = began_ms.max(here.since_ms);
-        let way_ms = able.iter().filter_map(|m| {
-            let (at, flyer) = (m.at?, flyers.get(&m.id)?);
-            let ways = places.iter();
-            let ways = ways.map(|p| flight.longest_home_ms(at, *p, *flyer));
-            Some(ways.max()? + Self::round_ms(Some(flyer)))
-        });
+        let way_ms = able
+            .iter()
+            .filter_map(|m| Some(farthest_ms(m)? + Self::round_ms(flyers.get(&m.id))));
         let way_ms = way_ms.max().unwrap_or(0);
         let bound_ms = FACTOR * WAYS * snapshot.bounds.spread_ms() + SET_OUT_MS + way_ms;
         let limit_ms = snapshot.grown_ms(bound_ms, from_ms);
@@ -319,7 +331,10 @@ struct Here<'a> {
 
 /// What a peer knows to be too dense.
 fn dense_of(crowd: &[(u16, Sector)]) -> impl Iterator<Item = u16> + '_ {
-    crowd.iter().filter(|(_, s)| s.dense().is_some()).map(|(n, _)| *n)
+    crowd
+        .iter()
+        .filter(|(_, s)| s.dense().is_some())
+        .map(|(n, _)| *n)
 }
 
 /// Whether a UAV patrols, or circles, and could do either.
@@ -370,7 +385,10 @@ mod tests {
         let dense = is_dense.then_some((1_000, 1));
         let sector = Sector {
             look: None,
-            verdict: Some(Verdict { at_ms: 1_000, dense }),
+            verdict: Some(Verdict {
+                at_ms: 1_000,
+                dense,
+            }),
         };
         let id = TaskId {
             author: MISSION,
@@ -423,15 +441,28 @@ mod tests {
         assert_eq!(rules, ["crowd-circle"]);
         // It has time to fly there.
         assert!(broken(&[patrols(), patrols()], false, 100).0.is_empty());
+        let few = |mut view: Beliefs| {
+            view.spendable_ms = 100_000;
+            view
+        };
+        let dry = [few(patrols()), few(patrols())];
+        assert!(broken(&dry, false, 400).0.is_empty());
         // Alone it patrols; where it has eased, nobody is wanted; who does not know asks nobody.
         assert!(broken(&[patrols()], false, 400).0.is_empty());
-        assert!(broken(&[patrols(), says(false, None)], false, 400).0.is_empty());
+        assert!(
+            broken(&[patrols(), says(false, None)], false, 400)
+                .0
+                .is_empty()
+        );
         let (rules, watched) = broken(&[circles(), patrols()], true, 400);
         assert!(rules.is_empty(), "{rules:?}");
         assert_eq!((watched.after_ms, watched.pictured_ms), (vec![0], 399_000));
         // Under way it is nowhere yet.
         let under_way = says(true, Some(Progress::Committed));
-        assert_eq!(broken(&[under_way, patrols()], true, 400).0, ["crowd-circle"]);
+        assert_eq!(
+            broken(&[under_way, patrols()], true, 400).0,
+            ["crowd-circle"]
+        );
     }
 
     #[test]
@@ -442,7 +473,11 @@ mod tests {
         assert_eq!(rules, ["crowd-circle", "crowd-linger"]);
         let (rules, _) = broken(&[circles(false), patrols(false)], true, 400);
         assert_eq!(rules, ["crowd-linger"]);
-        assert!(broken(&[circles(false), patrols(false)], true, 30).0.is_empty());
+        assert!(
+            broken(&[circles(false), patrols(false)], true, 30)
+                .0
+                .is_empty()
+        );
     }
 
     #[test]

@@ -115,7 +115,11 @@ impl CrowdReport {
         ];
         let w = &self.watched;
         if w.circled_ms > 0 {
-            let after: Vec<String> = w.after_ms.iter().map(|ms| format!("{:.0}", secs(*ms))).collect();
+            let after: Vec<String> = w
+                .after_ms
+                .iter()
+                .map(|ms| format!("{:.0}", secs(*ms)))
+                .collect();
             lines.push(format!(
                 "circled above for {:.0} s, {} s after something was too dense; sectors that were had somebody's picture for {:.0} of {:.0} s",
                 secs(w.circled_ms),
