@@ -480,6 +480,7 @@ fn the_patrol_is_left_while_the_crowd_is_too_dense() {
     };
     let mut h = with_operator(2, mission.clone());
     let is_in = |h: &Harness, state: &str| [1, 2].iter().all(|id| work(h, *id).state == state);
+    h.run_s(10);
     assert!(h.run_until(300, |h| is_in(h, "watch")));
     crowds::tell(&mut h, &mission, (SECTOR, true));
     assert!(h.run_until(5, |h| is_in(h, "clear")));
