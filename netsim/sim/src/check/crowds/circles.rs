@@ -175,8 +175,7 @@ impl CircleCheck {
         let pictured = dense.intersection(&in_picture).count();
         self.watched.pictured_ms += step_ms * count(pictured);
         let circles = uavs.iter().any(|m| {
-            circle_of(m).is_some_and(|p| is_there(p))
-                && dense.iter().any(|n| in_picture.contains(n))
+            circle_of(m).is_some_and(is_there) && dense.iter().any(|n| in_picture.contains(n))
         });
         if dense.is_empty() {
             (self.waits_ms, self.circles_now) = (None, false);
