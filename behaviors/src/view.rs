@@ -8,11 +8,11 @@
 
 use crate::attitude::Attitude;
 use crate::percept::Percept;
-use skein_flight::airframe::Airframe;
+use skein_flight::airframe::{Airframe, GRAVITY_MPS2};
 use skein_flight::coverage::ring::patch::{Corners, frame_holds};
 use skein_flight::mount::RESOLVED;
 use skein_geometry::frame::{Point, Pose};
-use skein_geometry::math::sin_cos;
+use skein_geometry::math::{atan2, sin_cos};
 
 /// A picture of the ground.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +53,28 @@ impl View {
             across_m: airframe.footprint_across_m,
             along_m: airframe.footprint_along_m,
             tilt: None,
+        }
+    }
+
+    /// What a UAV has in its picture at a pose, so high, in a steady turn at its cruise, to the
+    /// right where the curvature is negative: a gimbal takes away of the bank what it can.
+    #[must_use]
+    pub fn turning(pose: Pose, airframe: &Airframe, height_m: f64, curvature_per_m: f64) -> Self {
+        let pull = airframe.cruise_mps * airframe.cruise_mps * curvature_per_m;
+        let bank_rad = atan2(pull, GRAVITY_MPS2);
+        let rolls_rad = airframe.mount.gimbal().map_or(0.0, |g| g.roll_rad);
+        let attitude = Attitude {
+            bank_rad,
+            gimbal_roll_rad: (-bank_rad).clamp(-rolls_rad, rolls_rad),
+            ..Attitude::default()
+        };
+        let tilt = (!airframe.mount.is_level()).then_some(Tilt {
+            height_m,
+            attitude: Some(attitude),
+        });
+        Self {
+            tilt,
+            ..Self::level(pose, airframe)
         }
     }
 
@@ -205,6 +227,32 @@ mod tests {
         };
         let (holds, not) = (view.holds(&patch(38.0), 3.0, 0.02), patch(42.0));
         assert!(holds && view.holds(&not, 0.0, 0.0) && !view.holds(&not, 3.0, 0.02));
+    }
+
+    #[test]
+    fn a_turn_looks_outwards_unless_a_gimbal_levels_it() {
+        use skein_flight::mount::Gimbal;
+        let pose = Pose::new(Point::new(0.0, 0.0), 0.0);
+        let (left, right) = (Point::new(0.0, 40.0), Point::new(0.0, -40.0));
+        let gimbal = Gimbal {
+            roll_rad: 1.0,
+            pitch_rad: 1.0,
+            rate_radps: 1.0,
+        };
+        for (mount, curvature_per_m, shows) in [
+            (Mount::Level, 0.02, (true, true)),
+            (Mount::Gimbal(gimbal), 0.02, (true, true)),
+            (Mount::Fixed, 0.0, (true, true)),
+            (Mount::Fixed, 0.02, (false, true)),
+            (Mount::Fixed, -0.02, (true, false)),
+        ] {
+            let airframe = Airframe {
+                mount,
+                ..airframe()
+            };
+            let view = View::turning(pose, &airframe, 90.0, curvature_per_m);
+            assert_eq!((view.shows(left, 1.0), view.shows(right, 1.0)), shows);
+        }
     }
 
     /// A bank of 60° shows the ground to the horizon: what is far is too small.

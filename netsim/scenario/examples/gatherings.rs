@@ -29,6 +29,11 @@ struct Totals {
     to_look: Vec<u64>,
     to_ground: Vec<u64>,
     kbps: Vec<f64>,
+    /// How long sectors were known to be too dense, in somebody's picture of that, and how long
+    /// somebody circled above, ms.
+    dense: (u64, u64, u64),
+    /// How long after something was too dense somebody circled, ms.
+    to_circle: Vec<u64>,
 }
 
 fn at(mut all: Vec<u64>, share: f64) -> f64 {
@@ -51,6 +56,14 @@ impl Totals {
         self.now = sum(self.now, r.people_now);
         self.told += r.episodes.0;
         self.untold += r.episodes.1.untold;
+        let w = &r.watched;
+        let (all, pictured, circled) = self.dense;
+        self.dense = (
+            all + w.dense_ms,
+            pictured + w.pictured_ms,
+            circled + w.circled_ms,
+        );
+        self.to_circle.extend(&w.after_ms);
         for a in &r.alerts {
             match a.truly_since_ms {
                 Some(ms) => self.to_look.push(a.told.since_ms.saturating_sub(ms)),
@@ -66,7 +79,7 @@ impl Totals {
         let most = self.kbps.iter().copied().fold(0.0, f64::max);
         let mean = self.kbps.iter().sum::<f64>() / (self.kbps.len().max(1) as f64);
         format!(
-            "{} runs, {} failed; sectors in range {} of {}; all people {} of {}, as they walk {} of {}; too dense {} told, {} not; {} told near to it; seen after p50 {:.0} s p95 {:.0} s, on the ground {:.1} s and {:.1} s later, at most {:.1} s; crowd records {mean:.1} kbit/s, at most {most:.1}",
+            "{} runs, {} failed; sectors in range {} of {}; all people {} of {}, as they walk {} of {}; too dense {} told, {} not; {} told near to it; seen after p50 {:.0} s p95 {:.0} s, on the ground {:.1} s and {:.1} s later, at most {:.1} s; too dense for {} s, in a picture for {} s of that; circled above for {} s, {} times after p50 {:.0} s p95 {:.0} s; crowd records {mean:.1} kbit/s, at most {most:.1}",
             self.runs,
             self.broken,
             self.ranges.0,
@@ -83,6 +96,12 @@ impl Totals {
             at(self.to_ground.clone(), 0.5),
             at(self.to_ground.clone(), 0.95),
             at(self.to_ground.clone(), 1.0),
+            self.dense.0 / 1_000,
+            self.dense.1 / 1_000,
+            self.dense.2 / 1_000,
+            self.to_circle.len(),
+            at(self.to_circle.clone(), 0.5),
+            at(self.to_circle.clone(), 0.95),
         )
     }
 }

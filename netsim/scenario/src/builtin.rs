@@ -37,6 +37,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/event.json5"),
     ),
     (
+        "stage",
+        "stage.json5",
+        include_str!("../../../configs/trials/stage.json5"),
+    ),
+    (
         "parking",
         "parking.json5",
         include_str!("../../../configs/trials/parking.json5"),

@@ -37,3 +37,22 @@ fn an_event_is_watched_by_one_uav_and_by_many() {
         assert!(off(jam.told.east_mm, 133) && off(jam.told.north_mm, 233));
     }
 }
+
+#[test]
+fn what_becomes_too_dense_has_a_uav_above_it_until_it_has_eased() {
+    let prepared = Prepared::new(load_builtin("stage", &Overrides::default()).unwrap().spec);
+    let outcome = run(&prepared, 11, Vec::new(), Wanted::default());
+    let (report, broken) = (&outcome.report, outcome.violations());
+    assert!(report.passed, "{:?} {broken:?}", report.reasons);
+    let told = report.crowd.as_ref().unwrap();
+    let (watched, lines) = (&told.watched, told.lines());
+    assert_eq!(told.people.looked, told.sectors, "{lines:?}");
+    let first_ms = *watched.after_ms.first().unwrap();
+    assert!(first_ms < 90_000, "{lines:?}");
+    // Whoever circles has what is too dense in its picture for most of the time.
+    assert!(watched.pictured_ms * 2 > watched.dense_ms, "{lines:?}");
+    assert!(
+        told.alerts.iter().all(|a| a.eased_ms.is_some()),
+        "{lines:?}"
+    );
+}

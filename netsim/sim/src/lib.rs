@@ -51,7 +51,7 @@ pub mod world;
 pub use check::Findings;
 pub use check::contours::{ContourCheck, ContourReport};
 pub use check::counts::CountReport;
-pub use check::crowds::{CrowdAlertReport, CrowdReport};
+pub use check::crowds::{CrowdAlertReport, CrowdReport, Watched};
 pub use check::detections::{DetectionCheck, DetectionReport, Truth};
 pub use check::footprint::FootprintErrors;
 pub use check::streets::{HintReport, StreetsReport};

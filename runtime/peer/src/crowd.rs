@@ -5,6 +5,7 @@
 //! |---|---|
 //! | is certainly denser than the norm | told, once: where, how dense, when, by whom |
 //! | and the mission says look | a look at it is asked for again and again, which the auction gives out |
+//! | and it says circle | one UAV stays above it until it has eased, which the auction gives out; what no circle holds is looked at |
 //! | is certainly less dense than where it counts as eased | that is told, and nothing more follows |
 //! | may be either | it is what it was |
 
@@ -34,6 +35,9 @@ pub const DENSE_E2: (u16, u16) = (1, 1_000);
 /// How often a sector that is too dense is looked at, at least and at most, seconds.
 pub const LOOK_S: (u16, u16) = (10, 3_600);
 
+/// Most circles that a mission has flown at once.
+pub const CIRCLES_MAX: (u16, u16) = (1, 8);
+
 /// Sectors of a tile, each way.
 const TILE: u16 = 4;
 
@@ -46,11 +50,13 @@ pub enum ThenWatch {
     Notify,
     /// It is told, and somebody looks at it again and again until it has eased.
     Look,
+    /// It is told, and somebody stays above it until it has eased.
+    Circle,
 }
 
 impl ThenWatch {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Notify, Self::Look];
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Notify, Self::Look, Self::Circle];
 
     /// Its name in a file.
     #[must_use]
@@ -58,6 +64,7 @@ impl ThenWatch {
         match self {
             Self::Notify => "notify",
             Self::Look => "look",
+            Self::Circle => "circle",
         }
     }
 }
@@ -85,8 +92,23 @@ pub struct CrowdWatch {
     pub then: ThenWatch,
     /// So often a sector that is too dense is looked at, seconds.
     pub look_every_s: u16,
-    /// What such a look is worth.
+    /// What such a look is worth, or such a circle.
     pub worth: u16,
+    /// So many circles are flown at once at most.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub circles_max: u16,
+}
+
+fn one() -> u16 {
+    1
+}
+
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde hands over a reference"
+)]
+fn is_one(n: &u16) -> bool {
+    *n == 1
 }
 
 impl CrowdWatch {
@@ -249,7 +271,12 @@ impl CrowdWatch {
             ));
         }
         within("look_every_s", self.look_every_s, LOOK_S, "s")?;
-        within("worth", self.worth, (1, WORTH_MAX), "")
+        within("worth", self.worth, (1, WORTH_MAX), "")?;
+        if self.then != ThenWatch::Circle && self.circles_max != 1 {
+            let text = "is of use with `then: \"circle\"` alone".to_owned();
+            return Err(("circles_max", text));
+        }
+        within("circles_max", self.circles_max, CIRCLES_MAX, "circles")
     }
 
     /// Whether it lies in an area, and each sector whole in the inner part of a picture that
@@ -304,6 +331,10 @@ impl CrowdWatch {
             h.write_i64(i64::from(v));
         }
         h.write_i64(self.then as i64);
+        if self.then == ThenWatch::Circle {
+            h.write_i64(-13);
+            h.write_i64(i64::from(self.circles_max));
+        }
     }
 
     /// Where a sector is, for a task.
@@ -344,6 +375,7 @@ pub(crate) mod tests {
             then: ThenWatch::Look,
             look_every_s: 40,
             worth: 100,
+            circles_max: 1,
         }
     }
 
@@ -376,7 +408,7 @@ pub(crate) mod tests {
     fn what_is_wrong_is_named_with_its_field() {
         assert_eq!(event().check(), Ok(()));
         type Change = fn(&mut CrowdWatch);
-        let cases: [(Change, &str); 12] = [
+        let cases: [(Change, &str); 15] = [
             (|c| c.sector_m = 0, "sector_m"),
             (|c| c.sector_m = 25, "sector_m"),
             (|c| c.sector_m = 90, "sector_m"),
@@ -389,6 +421,15 @@ pub(crate) mod tests {
             (|c| c.eased_e2 = 350, "eased_per_m2"),
             (|c| c.look_every_s = 0, "look_every_s"),
             (|c| c.worth = 0, "worth"),
+            (|c| c.circles_max = 2, "circles_max"),
+            (
+                |c| (c.then, c.circles_max) = (ThenWatch::Circle, 0),
+                "circles_max",
+            ),
+            (
+                |c| (c.then, c.circles_max) = (ThenWatch::Circle, 9),
+                "circles_max",
+            ),
         ];
         for (change, field) in cases {
             let mut event = event();

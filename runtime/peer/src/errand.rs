@@ -14,7 +14,7 @@
 
 use crate::mission::{Mission, point_m};
 use crate::offload::MissionGeometry;
-use crate::relay_circle;
+use crate::relay_circle::{self, Eye};
 use crate::wire::limits::DURATION_MAX_MS;
 use crate::wire::tasks::{Task, TaskKind};
 use skein_behaviors::executive::GivenFlight;
@@ -83,6 +83,8 @@ pub struct Request {
     pub from: Pose,
     /// How fast, m/s.
     pub airspeed_mps: f64,
+    /// Of a circle above a place, by which camera it is watched.
+    pub eye: Option<Eye>,
 }
 
 /// What a task asks to see, of a place or a line; none for other kinds.
@@ -266,7 +268,8 @@ impl Request {
     pub fn plan(&self) -> Result<Planned, String> {
         if self.task.is_held() {
             let (mission, router) = (&self.geometry.mission, &self.geometry.router);
-            let circle = relay_circle::planned(mission, router, &self.task, self.from)?;
+            let circle =
+                relay_circle::planned(mission, router, (&self.task, self.eye.as_ref()), self.from)?;
             return Ok(Planned::Circle(circle));
         }
         self.flight().map(Planned::Flight)
@@ -355,6 +358,7 @@ mod tests {
             task: task.clone(),
             from,
             airspeed_mps: 13.0,
+            eye: None,
         };
         request.flight()
     }
@@ -414,6 +418,7 @@ mod tests {
             task: task(TaskKind::Area, places, 0),
             from: Pose::new(Point::new(20.0, 20.0), 0.0),
             airspeed_mps: 13.0,
+            eye: None,
         };
         for places in [
             vec![(20, 180), (140, 180), (140, 280), (20, 280)],

@@ -3,7 +3,7 @@
 use crate::buildings::Buildings;
 use crate::count_site::{CountSite, SITES_MAX};
 use crate::criteria::{CRITERIA_MAX, Criterion};
-use crate::crowd::CrowdWatch;
+use crate::crowd::{CrowdWatch, ThenWatch};
 use crate::diagram::{Diagram, DiagramError, Machine, check};
 use crate::input::NewTask;
 use crate::layers::Layers;
@@ -544,6 +544,19 @@ impl Mission {
         };
         let wrong = |(field, text)| GeometryError::Crowd(field, text);
         crowd.check().map_err(wrong)?;
+        if crowd.then == ThenWatch::Circle {
+            let refused = |text: &str| Err(GeometryError::Crowd("then", text.to_owned()));
+            if self.separation_mm > 0 {
+                return refused(
+                    "is \"circle\", and no tasks are flown where UAVs are kept apart by agreement: expected \"notify\", or heights of their own",
+                );
+            }
+            if !self.machine()?.relays() {
+                return refused(
+                    "is \"circle\", and no state of the diagram has the goal \"relay\": expected one, or \"notify\"",
+                );
+            }
+        }
         let area = Polygon::new(self.area_m()).map_err(GeometryError::Area)?;
         let half_mm = self.footprint_across_mm.min(self.footprint_along_mm);
         let overlap_m = if self.task.is_area() {
@@ -979,7 +992,7 @@ mod tests {
 
     #[test]
     fn missions_that_differ_in_anything_differ_in_their_hash() {
-        let changes: [fn(&mut Mission); 52] = [
+        let changes: [fn(&mut Mission); 54] = [
             |_| {},
             |m| m.revision = 2,
             |m| m.origin_lat_e7 += 1,
@@ -1059,6 +1072,16 @@ mod tests {
             |m| {
                 let mut crowd = crate::crowd::tests::event();
                 crowd.dense_e2 += 1;
+                m.crowd = Some(Arc::new(crowd));
+            },
+            |m| {
+                let mut crowd = crate::crowd::tests::event();
+                crowd.then = crate::crowd::ThenWatch::Circle;
+                m.crowd = Some(Arc::new(crowd));
+            },
+            |m| {
+                let mut crowd = crate::crowd::tests::event();
+                (crowd.then, crowd.circles_max) = (crate::crowd::ThenWatch::Circle, 2);
                 m.crowd = Some(Arc::new(crowd));
             },
             |m| m.buildings = Some(Arc::new(crate::buildings::tests::houses(1))),

@@ -21,6 +21,7 @@
 //! While no task is open nothing is said.
 
 mod brought;
+mod circles;
 mod counts;
 mod crowds;
 mod detecting;
@@ -54,7 +55,9 @@ use crate::wire::tasks::{
     Bundle, BundleTask, DoneTask, Offer, Progress, Task, TaskId, TaskKind, TaskState, sensor_name,
 };
 use crate::{Incarnation, PeerId};
+use brought::is_brought;
 pub use brought::{BROUGHT_MAX, MISSION};
+use circles::{Circles, flies_circles};
 use relaying::Held;
 pub(crate) use relaying::KEPT_FOR_COVER;
 pub use serving::Call;
@@ -146,6 +149,7 @@ pub(crate) struct Tasking {
     pub(crate) using: Using,
     /// And who is where at the event that it watches.
     pub(crate) gathering: Gathering,
+    circles: Circles,
     /// The version of the bundle that was spoken last.
     spoken: Option<Version>,
     /// Tasks of others that this peer's operator said to be done, ascending.
@@ -178,6 +182,7 @@ impl Tasking {
             counting: Counting::new(config.id.0),
             using: Using::new(config.id.0),
             gathering: Gathering::new(config.id.0),
+            circles: Circles::default(),
             spoken: None,
             said_done: Vec::new(),
             told_in: 0,
@@ -238,7 +243,7 @@ impl Tasking {
         let mine = |id: &TaskId| self.flown() == Some(*id);
         let mut open = self.known.iter().filter(|(_, k)| k.is_open());
         // What a mission brings is a part of it.
-        let keeps = |id: &TaskId, k: &Known| !k.task.is_held() || id.author == MISSION || mine(id);
+        let keeps = |id: &TaskId, k: &Known| !k.task.is_held() || is_brought(*id) || mine(id);
         open.any(|(id, k)| !hopeless.contains(id) && keeps(id, k))
     }
 
@@ -403,6 +408,12 @@ impl Tasking {
             effects.retain(|e| !matches!(e, Effect::Negotiate));
             effects.extend(self.tell_of_tasks(s));
             effects.extend(self.tell_of_event(s, state));
+            let circles = self.derive_circles(s, state);
+            effects.extend(
+                circles
+                    .into_iter()
+                    .filter(|e| !matches!(e, Effect::Negotiate)),
+            );
             return effects;
         }
         let geometry = std::sync::Arc::clone(&state.geometry);
@@ -482,7 +493,8 @@ impl Tasking {
 
     /// Tells the auction what is new, and carries out what follows.
     fn settle(&mut self, s: &Situation<'_>, order: Order, state: &mut MissionState) -> Effects {
-        let mut events = Vec::new();
+        let withdrawn = core::mem::take(&mut self.circles.withdrawn);
+        let mut events: Vec<Event> = withdrawn.into_iter().map(Event::Withdrawn).collect();
         for id in core::mem::take(&mut self.news) {
             if let Some(known) = self.known.get(&id) {
                 events.push(Event::Task(id, known.task.clone()));
@@ -495,10 +507,10 @@ impl Tasking {
         }
         let is_period = s.now.since_ms(self.last_period) >= s.membership.interval_ms();
         let able = Self::is_able(s, order, state);
-        // What a mission brings goes before its cells.
-        let is_open = !state.negotiation.sections.complete()
-            && !state.stage.ended()
-            && state.geometry.mission.tasks.is_empty();
+        // What a mission brings goes before its cells; nobody circles but beside those who patrol.
+        let mission = &state.geometry.mission;
+        let covers = !state.negotiation.sections.complete() && mission.tasks.is_empty();
+        let is_open = !state.stage.ended() && (covers || flies_circles(mission));
         // Nobody has to be left for cells from now on, or somebody has.
         let turns = is_open != self.auction.cells_open();
         let is_told = is_period || able != self.was_able || turns;
@@ -635,6 +647,7 @@ impl Tasking {
             task: self.as_flown((flown.id, flown.revision), task, &state.geometry.mission),
             from: executive.pose()?,
             airspeed_mps: airframe.cruise_mps,
+            eye: self.eye(flown.id, &state.geometry.mission),
         };
         let pending = PendingJob::Errand(flown.id, flown.revision, flown.tries);
         Some(Effect::Compute(pending, Job::Errand(Box::new(request))))

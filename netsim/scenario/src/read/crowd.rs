@@ -74,6 +74,7 @@ pub(crate) fn of_mission(mission: &Node<'_>) -> Result<Option<Arc<CrowdWatch>>, 
         "then",
         "look_every_s",
         "worth",
+        "circles_max",
     ])?;
     let at = f.need("area", BOX)?;
     let area = sides(at)?;
@@ -118,6 +119,7 @@ pub(crate) fn of_mission(mission: &Node<'_>) -> Result<Option<Arc<CrowdWatch>>, 
         then,
         look_every_s: f.small_or("look_every_s", LOOK_S, 1, u16::MAX, "seconds")?,
         worth: f.small_or("worth", WORTH, 1, WORTH_MAX, "the worth of a task")?,
+        circles_max: f.small_or("circles_max", 1, 1, u16::MAX, "circles at once")?,
     };
     match watch.check() {
         Ok(()) => Ok(Some(Arc::new(watch))),
@@ -229,6 +231,8 @@ mod tests {
         assert_eq!((read.cols, read.rows, read.sector_m), (10, 4, 20));
         assert_eq!((read.dense_e2, read.eased_e2), (250, 200));
         assert_eq!((read.then, read.look_every_s), (ThenWatch::Look, 60));
+        let read = with(&format!("{{ {area}, then: 'circle', circles_max: 2 }}")).unwrap();
+        assert_eq!((read.then, read.circles_max), (ThenWatch::Circle, 2));
         let of = |sides: &str| format!("{{ area: {{ {sides} }} }}");
         for (crowd, why) in [
             ("{ }".to_owned(), "mission.crowd"),
@@ -262,6 +266,14 @@ mod tests {
             (format!("{{ {area}, interval_s: 2 }}"), "interval_s"),
             (format!("{{ {area}, look_every_s: 2 }}"), "look_every_s"),
             (format!("{{ {area}, then: 'shout' }}"), "then"),
+            (
+                format!("{{ {area}, then: 'look', circles_max: 2 }}"),
+                "alone",
+            ),
+            (
+                format!("{{ {area}, then: 'circle', circles_max: 9 }}"),
+                "1 to 8 circles",
+            ),
             (format!("{{ {area}, norm: 3 }}"), "norm"),
         ] {
             let said = with(&crowd).unwrap_err();

@@ -1,6 +1,6 @@
 //! The people of a mass event as UAVs tell of them, beside where people truly are (`crowd-sight`,
 //! `crowd-idle`, `crowd-norm`, `crowd-late`, `crowd-false`, `crowd-range`, `crowd-people`,
-//! `crowd-agree`; D2.7 §3.1).
+//! `crowd-agree`; D2.7 §3.1). Who stays above what is too dense is `circles.rs`'s.
 //!
 //! | what | beside |
 //! |---|---|
@@ -18,6 +18,7 @@
 //! four standard deviations away. A range holds in nineteen cases of twenty; errors of one flight
 //! are alike, so of sixty and more that are told 0.85 are asked for.
 
+use super::flight::{FlightCheck, Flyer};
 use super::spread::{light_limit_ms, record_limit};
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::world::camera::Picture;
@@ -30,8 +31,11 @@ use skein_peer::wire::crowd::SECTORS_EACH;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+mod circles;
 mod report;
 mod truth;
+use circles::CircleCheck;
+pub use circles::Watched;
 pub use report::{CrowdAlertReport, CrowdReport};
 use truth::Truth;
 
@@ -120,12 +124,14 @@ pub struct CrowdCheck {
     alerts: Vec<CrowdAlertReport>,
     wrong_told: BTreeSet<(u16, u64, bool)>,
     report: CrowdReport,
+    circles: CircleCheck,
 }
 
 impl CrowdCheck {
     /// The operator has a mission.
     pub fn on_mission(&mut self, mission: &Mission) {
         self.revision = mission.revision;
+        self.circles.on_mission(mission);
         let of = mission.crowd_hash();
         let Some(watch) = &mission.crowd else {
             *self = Self::default();
@@ -139,6 +145,7 @@ impl CrowdCheck {
             revision: mission.revision,
             truth: Truth::new(watch),
             watch: Some(Arc::clone(watch)),
+            circles: core::mem::take(&mut self.circles),
             ..Self::default()
         };
     }
@@ -167,6 +174,10 @@ impl CrowdCheck {
         if look.is_late || !look.looks {
             return;
         }
+        let dense = look.known.sectors().filter(|(_, s)| s.dense().is_some());
+        let dense: Vec<u16> = dense.map(|(n, _)| n).collect();
+        self.circles
+            .on_look(now_ms, look.uav.0, &look.picture, &dense);
         let watcher = self.watchers.entry(look.uav).or_default();
         let second_ms = now_ms / 1_000 * 1_000;
         let since = |s: &Sector, ms: u64| s.look.is_some_and(|l| l.seen_ms + ms >= second_ms);
@@ -278,10 +289,16 @@ impl CrowdCheck {
     }
 
     /// What all are told, beside what was true, and whether they are told the same.
-    pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
+    pub fn on_snapshot(
+        &mut self,
+        snapshot: &Snapshot<'_>,
+        flyers: (&BTreeMap<u16, Flyer>, &FlightCheck),
+        found: &mut Findings,
+    ) {
         if self.watch.is_none() {
             return;
         }
+        self.circles.on_snapshot(snapshot, flyers, found);
         let follows = |m: &&PeerSnapshot| m.view.revision >= self.revision;
         let peers: Vec<&PeerSnapshot> = snapshot.peers.iter().filter(follows).collect();
         let able = peers
@@ -476,6 +493,7 @@ impl CrowdCheck {
             people_now: self.people_now,
             alerts: self.alerts.clone(),
             episodes: (told, missed),
+            watched: self.circles.watched(),
             ..self.report.clone()
         })
     }

@@ -356,8 +356,8 @@ impl Rules {
         self.spoken.on_snapshot(snapshot, found);
         self.spread.on_snapshot(snapshot, found);
         self.tasks.on_snapshot(snapshot, found);
-        self.crowds.on_snapshot(snapshot, found);
         let flyers = (&self.flyers, &self.flight);
+        self.crowds.on_snapshot(snapshot, flyers, found);
         self.relays.on_snapshot(snapshot, flyers, found);
         self.airtime.on_snapshot(snapshot, found);
         self.on_way_home(snapshot, found);

@@ -534,6 +534,12 @@ impl Machine {
         self.states().iter().any(|s| s.goal == StateGoal::Trace)
     }
 
+    /// Whether some state holds a relay position.
+    #[must_use]
+    pub fn relays(&self) -> bool {
+        self.states().iter().any(|s| s.goal == StateGoal::Relay)
+    }
+
     /// Whether it goes on once everything is seen, until something else ends it.
     #[must_use]
     pub fn goes_on(&self) -> bool {

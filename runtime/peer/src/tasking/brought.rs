@@ -20,6 +20,14 @@ pub const MISSION: u16 = u16::MAX;
 /// Most tasks that a mission brings.
 pub const BROUGHT_MAX: usize = 8;
 
+/// Numbers from here on are those of circles, by the sector above which they are flown.
+pub(super) const CIRCLES_FROM: u16 = TASKS_MAX + BROUGHT_MAX as u16;
+
+/// Whether it is a task that a mission brings.
+pub(super) fn is_brought(id: TaskId) -> bool {
+    id.author == MISSION && id.number < CIRCLES_FROM
+}
+
 impl Mission {
     /// The tasks that it brings, by the numbers by which they are known; `over` once nobody wants
     /// them any more. What cannot be said is left out.
@@ -93,7 +101,7 @@ impl Tasking {
         // What another mission brought is over.
         let known = self.known.iter().filter(|(id, k)| {
             let is_old = usize::from(id.number - TASKS_MAX.min(id.number)) >= mission.tasks.len();
-            id.author == MISSION && is_old && k.task.is_open()
+            is_brought(**id) && is_old && k.task.is_open()
         });
         let old: Vec<(TaskId, Task)> = known.map(|(id, k)| (*id, k.task.clone())).collect();
         for (id, task) in old {

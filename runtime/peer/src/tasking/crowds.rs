@@ -1,12 +1,12 @@
 //! What follows where an event that a mission watches is too dense (D2.7 §3.1): people are told,
-//! and where the mission says so somebody looks there again and again, by the auction. Who is where
-//! is [`crate::gathering`]'s.
+//! and where the mission says so somebody looks there again and again, by the auction, or stays
+//! above it (`circles.rs`). Who is where is [`crate::gathering`]'s.
 //!
 //! | what holds | what follows |
 //! |---|---|
 //! | its mission watches an event, and is not over for it | each look counts |
 //! | a sector is too dense, this UAV saw it last, and that was so long ago as the mission says | a task of this peer to look at it |
-//! | that task is open, and the sector has eased | cancelled |
+//! | that task is open, and the sector has eased, or somebody stays above it | cancelled |
 //! | the mission is over or cancelled | likewise; what was seen is told |
 //!
 //! Whoever looked last asks, so where it is lost the next one to fly past goes on asking.
@@ -38,6 +38,7 @@ impl Tasking {
         if let Some(airframe) = self.flies {
             let looks = !mission.cancelled && !state.silent && !state.stage.ended();
             self.gathering.look(percept, &airframe, looks);
+            self.circles.height_m = percept.height_m;
         }
     }
 
@@ -65,7 +66,8 @@ impl Tasking {
             return effects;
         }
         let (mission, looks) = (Arc::clone(&state.geometry.mission), looks_at(state));
-        effects.extend(self.leave_eased(s, looks));
+        effects.extend(self.derive_circles(s, state));
+        effects.extend(self.leave_eased(s, &mission, looks));
         if let Some(watch) = mission.crowd.as_ref().filter(|_| looks) {
             effects.extend(self.ask_for_looks(s, &mission, watch));
         }
@@ -74,8 +76,13 @@ impl Tasking {
     }
 
     /// Own looks that are asked for where it has eased are wanted no more.
-    fn leave_eased(&mut self, s: &Situation<'_>, looks: bool) -> Effects {
-        let dense: Vec<u16> = self.gathering.dense().map(|(n, _)| register(n)).collect();
+    fn leave_eased(&mut self, s: &Situation<'_>, mission: &Mission, looks: bool) -> Effects {
+        let circled = self.circled(s, mission);
+        let dense = self.gathering.dense().map(|(n, _)| n);
+        let dense: Vec<u16> = dense
+            .filter(|n| !circled.contains(n))
+            .map(register)
+            .collect();
         let own = self.known.iter().filter(|(id, k)| {
             let is_look = (FIRST..TASKS_MAX).contains(&id.number);
             id.author == self.me && is_look && k.is_open()
@@ -95,16 +102,18 @@ impl Tasking {
         watch: &CrowdWatch,
     ) -> Effects {
         let mut effects = Effects::new();
-        if watch.then != ThenWatch::Look {
+        if watch.then == ThenWatch::Notify {
             return effects;
         }
+        let circled = self.circled(s, mission);
         let every_ms = 1_000 * u64::from(watch.look_every_s);
         let now_ms = self.gathering.last_ms();
         let is_due = |(sector, _): &(u16, Sector)| {
             let last = self.gathering.seen_last(*sector);
             last.is_some_and(|look| look.by == self.me && look.seen_ms + every_ms <= now_ms)
         };
-        let due: Vec<(u16, Sector)> = self.gathering.dense().filter(is_due).collect();
+        let due = self.gathering.dense().filter(is_due);
+        let due: Vec<(u16, Sector)> = due.filter(|(n, _)| !circled.contains(n)).collect();
         for (sector, _) in due {
             let id = TaskId {
                 author: self.me,
@@ -139,7 +148,7 @@ impl Tasking {
 }
 
 /// Whether looks at the event count.
-fn looks_at(state: &MissionState) -> bool {
+pub(super) fn looks_at(state: &MissionState) -> bool {
     !state.geometry.mission.cancelled && !state.stage.ended()
 }
 

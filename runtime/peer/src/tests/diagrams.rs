@@ -1,6 +1,7 @@
 //! Missions by diagrams of their own: what follows when all is seen, when the time is over, when
 //! a peer is lost.
 
+use super::crowds::{self, SECTOR};
 use super::{record, with_operator};
 use crate::diagram::{
     Action, Behaviour, Diagram, MissionEvent, Part, Purpose, State, StateGoal, Transition,
@@ -449,4 +450,44 @@ fn a_diagram_that_asks_for_something_else_than_the_mission_is_refused() {
     let lines = flown_by(lines, 1).machine().unwrap_err();
     assert_eq!(lines.place, "states[1].behaviour.dimension");
     assert!(mission(1, 6, 4).machine().is_ok());
+}
+
+/// A diagram by which all leave the patrol where the crowd is too dense, and come back to it.
+#[test]
+fn the_patrol_is_left_while_the_crowd_is_too_dense() {
+    let dense = (MissionEvent::CrowdDense, 0);
+    let mut diagram = with("clear", StateGoal::Hold, Part::Keeps, dense);
+    let round = rounds(900);
+    diagram
+        .transitions
+        .retain(|t| t.on != MissionEvent::MissionComplete);
+    let watch = round.states.iter().filter(|s| s.name == "watch");
+    diagram.states.extend(watch.cloned());
+    let all_seen = round.transitions.iter();
+    let all_seen = all_seen.filter(|t| t.on == MissionEvent::AllSeen);
+    diagram.transitions.extend(all_seen.cloned());
+    diagram.transitions.push(Transition {
+        from: None,
+        on: MissionEvent::Timer,
+        after_s: 900,
+        above_dmps: 0,
+        to: "home".into(),
+        priority: 36,
+    });
+    let mission = Mission {
+        crowd: crowds::watch(crate::crowd::ThenWatch::Notify, 1),
+        ..flown_by(diagram, 1)
+    };
+    let mut h = with_operator(2, mission.clone());
+    let is_in = |h: &Harness, state: &str| [1, 2].iter().all(|id| work(h, *id).state == state);
+    h.run_s(10);
+    assert!(h.run_until(300, |h| is_in(h, "watch")));
+    crowds::tell(&mut h, &mission, (SECTOR, true));
+    assert!(h.run_until(5, |h| is_in(h, "clear")));
+    h.run_s(20);
+    assert!(is_in(&h, "clear"), "{}", h.why(1));
+    let told = h.why(1).to_string();
+    assert!(told.contains("too dense"), "{told}");
+    crowds::tell(&mut h, &mission, (SECTOR, false));
+    assert!(h.run_until(5, |h| is_in(h, "watch")));
 }

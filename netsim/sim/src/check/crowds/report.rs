@@ -1,5 +1,6 @@
 //! What is told of an event beside what is true, for a person.
 
+use super::circles::Watched;
 use super::truth::Episode;
 use crate::account::secs;
 use serde::{Deserialize, Serialize};
@@ -64,6 +65,9 @@ pub struct CrowdReport {
     /// Of the times at which a sector truly was too dense for longer than 20 s, so many were told;
     /// of the others so many were looked at while it was clear.
     pub episodes: (usize, Episodes),
+    /// How long what was too dense was in a picture, and how soon somebody circled above.
+    #[serde(default)]
+    pub watched: Watched,
 }
 
 /// Times at which a sector was too dense, and nobody told so.
@@ -109,6 +113,21 @@ impl CrowdReport {
                 self.episodes.1.looked
             ),
         ];
+        let w = &self.watched;
+        if w.circled_ms > 0 {
+            let after: Vec<String> = w
+                .after_ms
+                .iter()
+                .map(|ms| format!("{:.0}", secs(*ms)))
+                .collect();
+            lines.push(format!(
+                "circled above for {:.0} s, {} s after something was too dense; sectors that were had somebody's picture for {:.0} of {:.0} s",
+                secs(w.circled_ms),
+                after.join(", "),
+                secs(w.pictured_ms),
+                secs(w.dense_ms)
+            ));
+        }
         lines.extend(self.alerts.iter().map(CrowdAlertReport::line));
         lines
     }

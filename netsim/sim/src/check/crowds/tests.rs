@@ -10,7 +10,7 @@ use skein_peer::gathering::{Look, Verdict};
 /// Of the four by four sectors of 20 m the one about (50, 50) m.
 const SECTOR: u16 = 10;
 
-fn watch() -> CrowdWatch {
+pub(super) fn watch() -> CrowdWatch {
     CrowdWatch {
         west_m: 0,
         south_m: 0,
@@ -23,6 +23,7 @@ fn watch() -> CrowdWatch {
         then: ThenWatch::Notify,
         look_every_s: 60,
         worth: 100,
+        circles_max: 1,
     }
 }
 
@@ -265,7 +266,9 @@ fn who_lacks_for_long_what_its_component_was_told_is_found() {
             };
             let views = [(1, knows(vec![(SECTOR, says)])), (2, knows(other))];
             story.snapshot(1_000 * s, &views, |snapshot| {
-                scene.check.on_snapshot(snapshot, &mut scene.found);
+                let flight = FlightCheck::new(BTreeMap::new(), Vec::new(), 10.0);
+                let flyers = (&BTreeMap::new(), &flight);
+                scene.check.on_snapshot(snapshot, flyers, &mut scene.found);
             });
         }
     };

@@ -78,6 +78,8 @@ type Rank = (Progress, u32, Reverse<PeerId>);
 pub enum Event {
     /// A task, a change of one, or its end.
     Task(TaskId, Task),
+    /// A task that followed from what all know follows from it no more: nobody asks for it.
+    Withdrawn(TaskId),
     /// Another peer's bundle.
     Heard(PeerId, Version, Bundle),
     /// Which other UAVs live and are not suspected.
@@ -307,6 +309,11 @@ impl Auction {
     fn note(&mut self, event: Event) -> bool {
         match event {
             Event::Task(id, task) => return self.note_task(id, task),
+            Event::Withdrawn(id) => {
+                let was = self.tasks.remove(&id).is_some();
+                self.stale |= was;
+                return was;
+            }
             Event::Heard(author, version, bundle) => {
                 let room = self.others.len() < PEERS_MAX;
                 let newer = self.known(author).map_or(room, |known| version > known);
