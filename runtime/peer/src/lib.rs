@@ -159,7 +159,7 @@ pub use peer::Peer;
 pub use stage::WIND_CALMER_MPS;
 pub use task::{CoverageTask, LineTask, PointTask};
 pub use task_desk::{TaskHolder, TaskView, WATCHERS_MAX};
-pub use tasking::{BROUGHT_MAX, Call, Follows, MISSION};
+pub use tasking::{BROUGHT_MAX, Call, Follows, MISSION, circled_sector};
 pub use transmission::Transmission;
 pub use why::Why;
 

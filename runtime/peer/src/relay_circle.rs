@@ -73,12 +73,8 @@ impl Eye {
         let square: Corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(corner);
         let holds = |k: &u32| {
             let flown_m = circle.length_m * f64::from(*k) / f64::from(SHOTS);
-            let pose = Segment {
-                length_m: flown_m,
-                ..*circle
-            };
             let view = View::turning(
-                pose.end(),
+                circle.pose_at(flown_m),
                 &self.airframe,
                 self.height_m,
                 circle.curvature_per_m,
@@ -140,7 +136,7 @@ impl Mission {
         f64::from(half_mm) / 1000.0 - side_m * FRAC_1_SQRT_2
     }
 
-    /// The circle from which a camera watches a place, and for which share of a round it holds it.
+    /// The circle from which a camera watches a place.
     ///
     /// # Errors
     /// A sentence that says why there is none.
@@ -149,7 +145,7 @@ impl Mission {
         task: &Task,
         zones: &NoFlyZones,
         eye: &Eye,
-    ) -> Result<(Segment, f64), String> {
+    ) -> Result<Segment, String> {
         let place = task.places.first().ok_or("it has no place")?;
         let place = point_m((place.east_mm, place.north_mm));
         self.is_near_enough(place)?;
@@ -166,7 +162,7 @@ impl Mission {
                 best = Some((circle, share));
             }
         }
-        best.ok_or_else(|| {
+        best.map(|b| b.0).ok_or_else(|| {
             format!(
                 "no circle within {within_m:.1} m of the place keeps {clearance_m:.1} m from the no-fly zones and has it in the camera"
             )
@@ -234,7 +230,7 @@ pub fn planned(
     from: Pose,
 ) -> Result<Segment, String> {
     let circle = match eye {
-        Some(eye) => mission.watch_circle(task, router.zones(), eye)?.0,
+        Some(eye) => mission.watch_circle(task, router.zones(), eye)?,
         None => mission.relay_circle(task, router.zones())?,
     };
     // Who is nearer to a zone than that, since one came, gets away from it first.
@@ -334,8 +330,9 @@ mod tests {
         let watched = |(east_m, north_m): (i32, i32), mount| {
             let mut task = relay(east_m, north_m, 0);
             task.radius_mm = crate::mission::mm(within_m).unsigned_abs();
-            let (circle, share) = m.watch_circle(&task, &zones, &eye(mount)).unwrap();
+            let circle = m.watch_circle(&task, &zones, &eye(mount)).unwrap();
             let place = Point::new(f64::from(east_m), f64::from(north_m));
+            let share = eye(mount).share(&circle, place);
             assert!(zones.is_clear(&halves(&circle), m.clearance_m() - 1e-6));
             assert!((centre(&circle) - place).norm() + 1.0 / circle.curvature_per_m < within_m);
             ((centre(&circle) - place).norm(), share)

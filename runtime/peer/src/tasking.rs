@@ -57,6 +57,7 @@ use crate::wire::tasks::{
 use crate::{Incarnation, PeerId};
 use brought::is_brought;
 pub use brought::{BROUGHT_MAX, MISSION};
+pub use circles::circled_sector;
 use circles::{Circles, flies_circles};
 use relaying::Held;
 pub(crate) use relaying::KEPT_FOR_COVER;
@@ -405,15 +406,10 @@ impl Tasking {
             let mut effects = self.void_former(s);
             let (mission, ended) = (&state.geometry.mission, state.stage.ended());
             effects.extend(self.take_brought(s.now, mission, ended));
-            effects.retain(|e| !matches!(e, Effect::Negotiate));
             effects.extend(self.tell_of_tasks(s));
             effects.extend(self.tell_of_event(s, state));
-            let circles = self.derive_circles(s, state);
-            effects.extend(
-                circles
-                    .into_iter()
-                    .filter(|e| !matches!(e, Effect::Negotiate)),
-            );
+            effects.extend(self.derive_circles(s, state));
+            effects.retain(|e| !matches!(e, Effect::Negotiate));
             return effects;
         }
         let geometry = std::sync::Arc::clone(&state.geometry);

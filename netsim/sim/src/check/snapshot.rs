@@ -104,6 +104,13 @@ impl Snapshot<'_> {
             .map(|i| &self.peers[i])
     }
 
+    /// Those of these peers that are UAVs and speak.
+    #[must_use]
+    pub fn speaking_uavs(&self, members: &[u16]) -> Vec<&PeerSnapshot> {
+        let peers = members.iter().filter_map(|id| self.peer(*id));
+        peers.filter(|m| m.uav && m.view.speaks).collect()
+    }
+
     /// The UAVs that hold the loop and can take part in planning.
     pub fn able(&self) -> impl Iterator<Item = &PeerSnapshot> {
         self.peers

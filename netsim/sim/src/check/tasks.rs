@@ -34,11 +34,7 @@ impl TaskCheck {
         self.done
             .extend(done.map(|(id, revision, _)| (*id, *revision)));
         for members in snapshot.graph.components() {
-            let peers: Vec<&PeerSnapshot> = members
-                .iter()
-                .filter_map(|id| snapshot.peer(*id))
-                .filter(|m| m.uav && m.view.speaks)
-                .collect();
+            let peers = snapshot.speaking_uavs(&members);
             let Some(first) = peers.first() else { continue };
             let Some(whole_ms) = snapshot.stability.component_since_ms(first.id) else {
                 continue;

@@ -147,8 +147,9 @@ fn id_of(sector: u16) -> TaskId {
     }
 }
 
-/// Above which sector a task is a circle.
-fn sector_of(id: TaskId) -> Option<u16> {
+/// Above which sector a task is a circle, if it is one.
+#[must_use]
+pub fn circled_sector(id: TaskId) -> Option<u16> {
     let sector = id.number.checked_sub(CIRCLES_FROM);
     sector.filter(|_| id.author == MISSION)
 }
@@ -188,7 +189,7 @@ impl Tasking {
         let known = self
             .known
             .iter()
-            .filter(|(id, _)| sector_of(**id).is_some());
+            .filter(|(id, _)| circled_sector(**id).is_some());
         let over = known.filter(|(id, k)| !stays(id, &k.task));
         let over: Vec<TaskId> = over.map(|(id, _)| *id).collect();
         let mut effects = Effects::new();
@@ -214,7 +215,7 @@ impl Tasking {
         let mut claimed: BTreeMap<u16, Progress> = BTreeMap::new();
         for held in self.claims(s).filter(|held| held.revision == revision) {
             let is_claim = !matches!(held.progress, Progress::Tentative | Progress::Done);
-            if let Some(sector) = sector_of(held.task).filter(|_| is_claim) {
+            if let Some(sector) = circled_sector(held.task).filter(|_| is_claim) {
                 let most = claimed.entry(sector).or_insert(held.progress);
                 *most = (*most).max(held.progress);
             }
@@ -250,7 +251,7 @@ impl Tasking {
 
     /// By which camera a task is watched; none where nothing is.
     pub(super) fn eye(&self, id: TaskId, mission: &Mission) -> Option<Eye> {
-        sector_of(id)?;
+        circled_sector(id)?;
         Some(Eye {
             airframe: self.flies?,
             height_m: self.circles.height_m,

@@ -25,8 +25,8 @@ use skein_geometry::math::TAU;
 use skein_peer::crowd::{CrowdWatch, ThenWatch};
 use skein_peer::gathering::Sector;
 use skein_peer::wire::message::Order;
-use skein_peer::wire::tasks::{Progress, TASKS_MAX, TaskId};
-use skein_peer::{BROUGHT_MAX, MISSION, Mission};
+use skein_peer::wire::tasks::Progress;
+use skein_peer::{Mission, circled_sector};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -131,11 +131,7 @@ impl CircleCheck {
         }
         let mut seen = [const { BTreeSet::new() }; 3];
         for members in snapshot.graph.components() {
-            let peers: Vec<&PeerSnapshot> = members
-                .iter()
-                .filter_map(|id| snapshot.peer(*id))
-                .filter(|m| m.uav && m.view.speaks)
-                .collect();
+            let peers = snapshot.speaking_uavs(&members);
             let flies = |m: &&PeerSnapshot| !m.view.finished && m.view.revision >= self.revision;
             let Some(first) = peers.first().filter(|_| peers.iter().all(flies)) else {
                 continue;
@@ -344,13 +340,9 @@ fn can_fly(m: &PeerSnapshot) -> bool {
 
 /// How far a UAV is with a circle that it is to fly.
 fn circle_of(m: &PeerSnapshot) -> Option<Progress> {
-    let is_circle = |id: &TaskId| {
-        let from = usize::from(TASKS_MAX) + BROUGHT_MAX;
-        id.author == MISSION && usize::from(id.number) >= from
-    };
     let mut claims = m.view.tasks.iter();
     let is_claim = |p: &Progress| !matches!(p, Progress::Tentative | Progress::Done);
-    let claim = claims.find(|(id, _, p)| is_circle(id) && is_claim(p));
+    let claim = claims.find(|(id, _, p)| circled_sector(*id).is_some() && is_claim(p));
     claim.map(|(.., progress)| *progress)
 }
 
@@ -366,6 +358,8 @@ mod tests {
     use skein_geometry::frame::Pose;
     use skein_peer::Beliefs;
     use skein_peer::gathering::Verdict;
+    use skein_peer::wire::tasks::{TASKS_MAX, TaskId};
+    use skein_peer::{BROUGHT_MAX, MISSION};
 
     /// The sector about (50, 50) m of four by four.
     const SECTOR: u16 = 10;
