@@ -28,6 +28,10 @@ const TIGHTEST_M: f64 = 6.0;
 /// The point ahead is at least this far, metres.
 const AHEAD_M: f64 = 6.0;
 
+/// Who has a point ahead that is more to its side than this, forward over aside (a radian), has to
+/// turn round to it.
+const ASIDE: f64 = 0.64;
+
 /// Corners are looked for this far ahead, metres.
 const LOOK_M: f64 = 120.0;
 
@@ -190,10 +194,17 @@ impl Vehicle {
         AHEAD_M.max(0.8 * self.speed_mps)
     }
 
+    /// How far the point ahead is before the vehicle, and to its left, metres.
+    fn off_m(&self) -> (f64, f64) {
+        let to = self.ahead - self.at;
+        let (s, c) = sin_cos(self.heading_rad);
+        (to.dot(&Vector::new(c, s)), to.dot(&Vector::new(-s, c)))
+    }
+
     /// Moves the point ahead on along the road.
     fn lead(&mut self, roads: &Roads, uavs: &[Point]) {
         let reach_m = self.ahead_m();
-        while (self.ahead - self.at).norm() < reach_m {
+        while (self.ahead - self.at).norm() < reach_m || self.would_circle() {
             self.extend(roads, uavs);
             let next = roads.place(self.way[1]);
             let left = next - self.ahead;
@@ -213,6 +224,14 @@ impl Vehicle {
             }
             self.way.remove(0);
         }
+    }
+
+    /// Whether the point ahead is behind, and within the tightest circle on its side: it would
+    /// stay there, and the vehicle circle round it. Behind a hairpin it is.
+    fn would_circle(&self) -> bool {
+        let (forward_m, aside_m) = self.off_m();
+        let radius_m = (self.speed_mps * self.speed_mps / SIDEWAYS_MPS2).max(TIGHTEST_M);
+        forward_m < 0.0 && forward_m.hypot(aside_m.abs() - radius_m) < radius_m
     }
 
     /// The road is known as far as corners are looked for.
@@ -264,6 +283,11 @@ impl Vehicle {
         let hurries = self.behaviour == Behaviour::Evades && noticed;
         let free_mps = self.usual_mps * if hurries { HURRIES } else { 1.0 };
         let mut most_mps = self.corner.map_or(free_mps, |(mps, _)| free_mps.min(mps));
+        let (forward_m, aside_m) = self.off_m();
+        if forward_m < ASIDE * aside_m.abs() {
+            // Who has to turn so far does it on the tightest circle.
+            most_mps = most_mps.min((SIDEWAYS_MPS2 * TIGHTEST_M).sqrt());
+        }
         // To the vertex of the road, and to where the vehicle itself is half as far.
         let mut distance_m = 0.5 * (self.ahead - self.at).norm();
         let mut from = self.ahead;
@@ -323,6 +347,38 @@ mod tests {
             assert!(worst_m < 6.0, "{mps}: {worst_m} m beside the road");
             assert!(most_mps > 0.7 * mps && most_mps <= mps + 0.2, "{most_mps}");
             assert!(hardest < 5.0, "{hardest} m/s²");
+        }
+    }
+
+    #[test]
+    fn hairpins_are_driven_through() {
+        // Zigzags of streets, each corner of 100 to 170 degrees, legs of 8 to 60 m.
+        let mut random = SplitMix64::new(7);
+        for case in 0..40_u32 {
+            let mut way = vec![Point::new(0.0, 0.0), Point::new(60.0, 0.0)];
+            let (mut heading_rad, mut left) = (0.0, 1.0);
+            for _ in 0..6 {
+                heading_rad += left * (100.0 + 70.0 * random.unit()).to_radians();
+                left = if random.unit() < 0.5 { left } else { -left };
+                let (s, c) = sin_cos(heading_rad);
+                let leg_m = 8.0 + 52.0 * random.unit();
+                let last = way[way.len() - 1];
+                way.push(last + Vector::new(c, s) * leg_m);
+            }
+            let (s, c) = sin_cos(heading_rad);
+            let end = way[way.len() - 1] + Vector::new(c, s) * 120.0;
+            way.push(end);
+            let Some(roads) = Roads::of(&[way.clone()]) else {
+                continue;
+            };
+            let mut v = Vehicle::near(&roads, way[0], Behaviour::Drives, 9.0, u64::from(case));
+            let (mut reached, mut k) = (false, 0_u32);
+            while !reached && k < 3_000 {
+                v.drive(&roads, f64::from(k) * STEP_S, &[]);
+                reached = (v.at - end).norm() < 10.0;
+                k += 1;
+            }
+            assert!(reached, "case {case}: {way:?}, at {:?}", v.at);
         }
     }
 
