@@ -215,6 +215,7 @@ impl Witnessed {
                 uav: (uav, life),
                 picture: m.picture,
                 is_late: false,
+                sees: &|at: Point| world.is_open_from(m.eye, at),
                 watched,
             };
             let found = &mut self.found;

@@ -3,7 +3,7 @@
 //!
 //! | event | what follows |
 //! |---|---|
-//! | a look, all of a site is in the inner part of the picture, and nobody of a lower number has it in its own | the site is watched |
+//! | a look, all of a site is in the inner part of the picture, no building that the mission tells before a corner of it, and nobody of a lower number has it in its own | the site is watched |
 //! | a vehicle that was outside of a site is inside, while that is watched | it passes, once it is known to drive |
 //! | a vehicle is inside of a watched site | the time that it takes and the way that it drives are counted |
 //! | a site is watched for three seconds, from not too high up | who stands in it is counted anew |
@@ -26,12 +26,14 @@ use crate::effect::{Effect, Effects};
 use crate::input::Time;
 use crate::mission::Mission;
 use crate::registers::{Grows, Registers};
+use crate::sight::Sight;
 use crate::wire::codec::Body;
 use crate::wire::count::Count;
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Percept;
 use skein_behaviors::view::View;
 use skein_flight::airframe::Airframe;
+use skein_flight::tracking::buildings::Town;
 use skein_flight::tracking::tracks::{TargetName, Track, Tracks};
 use skein_geometry::Polygon;
 use skein_geometry::frame::{Point, Pose};
@@ -355,7 +357,7 @@ impl Counting {
         percept: &Percept,
         airframe: &Airframe,
         tracks: &Tracks,
-        (mission, counts): (&Mission, bool),
+        (mission, town, counts): (&Mission, Option<&Town>, bool),
     ) {
         self.follow(mission);
         let now_ms = percept.time_ms;
@@ -364,10 +366,10 @@ impl Counting {
         self.last_ms = now_ms;
         let counts = counts && percept.takes_off_in_ms == 0;
         let mut watched = 0_u16;
-        let view = View::of(percept, airframe);
+        let sight = Sight::of(percept, airframe, town);
         for (i, site) in self.sites.iter_mut().enumerate() {
             let corners = site.outline.vertices();
-            let is_pictured = || corners.iter().all(|p| view.shows(*p, INNER));
+            let is_pictured = || corners.iter().all(|p| sight.shows(*p, INNER));
             let is_watched = counts && !site.is_left_to_another && is_pictured();
             let was = site.since_ms.filter(|_| apart_ms > 0);
             if is_watched && was.is_some() {

@@ -128,6 +128,7 @@ pub mod protocol;
 mod registers;
 pub mod relay_circle;
 mod separation;
+mod sight;
 mod stage;
 pub mod streets;
 mod taking;

@@ -23,12 +23,12 @@ use crate::Incarnation;
 use crate::effect::Effect;
 use crate::input::Time;
 use crate::mission::{mm, point_m};
+use crate::sight::Sight;
 use crate::wire::codec::Body;
 use crate::wire::target::{SPREAD_MAX_E3, TARGETS_MAX, Target};
 use crate::wire::tasks::TaskId;
 use search::{Search, WAYS_MAX};
 use skein_behaviors::Percept;
-use skein_behaviors::view::View;
 use skein_flight::airframe::Airframe;
 use skein_flight::tracking::buildings::Town;
 use skein_flight::tracking::estimate::{Detection, Estimate};
@@ -194,9 +194,9 @@ impl Targets {
         };
         self.now_ms = percept.time_ms;
         let look: Vec<Sighting> = percept.sightings.seen().map(sighting).collect();
-        let view = View::of(percept, &airframe);
         let town = self.town.clone();
-        let in_view = |p: Point| shows(&view, percept, town.as_deref(), p);
+        let sight = Sight::of(percept, &airframe, town.as_deref());
+        let in_view = |p: Point| sight.shows(p, INNER);
         self.tracks.look(self.now_ms, &look, &in_view);
         self.count_hits();
         let own: Vec<Register> = self.own().collect();
@@ -518,12 +518,6 @@ fn sought_of(told: &Target) -> Sought {
         number: told.task,
     };
     (task, told.revision)
-}
-
-/// Whether a vehicle at a place would be in the inner part of a picture, and no building before it.
-fn shows(view: &View, percept: &Percept, town: Option<&Town>, p: Point) -> bool {
-    let hides = |t: &Town| t.buildings.hide(view.from(), percept.height_m, p);
-    view.shows(p, INNER) && !town.is_some_and(hides)
 }
 
 /// A target that stands.

@@ -3,7 +3,7 @@
 //!
 //! | event | what follows |
 //! |---|---|
-//! | a look, a part of a stretch is in the inner part of the picture, and nobody of a lower number has it in its own | that part is watched |
+//! | a look, a part of a stretch is in the inner part of the picture, no building that the mission tells before it, and nobody of a lower number has it in its own | that part is watched |
 //! | a confirmed track is on a watched part | the time that it takes and the way that it drives are counted for its stretch, in the interval of the day |
 //! | a track that was well on one stretch is well on another one, and their crossing is in the picture | a turn |
 //! | an interval is over, or so many beacon intervals passed since a register was told | it is told, if it grew |
@@ -24,6 +24,7 @@ use crate::effect::{Effect, Effects};
 use crate::input::Time;
 use crate::mission::Mission;
 use crate::registers::{Grows, Registers};
+use crate::sight::Sight;
 use crate::streets::Streets;
 use crate::wire::codec::Body;
 use crate::wire::usage::{
@@ -31,9 +32,9 @@ use crate::wire::usage::{
     subject_of_stretch, subject_of_turn,
 };
 use skein_behaviors::Percept;
-use skein_behaviors::view::View;
 use skein_flight::airframe::Airframe;
 use skein_flight::streets::{Network, Turn};
+use skein_flight::tracking::buildings::Town;
 use skein_flight::tracking::tracks::{TargetName, Track, Tracks};
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::hash::{Fnv, folded};
@@ -203,7 +204,7 @@ impl Using {
         percept: &Percept,
         airframe: &Airframe,
         tracks: &Tracks,
-        (mission, counts): (&Mission, bool),
+        (mission, town, counts): (&Mission, Option<&Town>, bool),
     ) {
         self.follow(mission);
         let now_ms = percept.time_ms;
@@ -220,14 +221,14 @@ impl Using {
         }
         let interval = followed.streets.interval_at(now_ms);
         let net = &followed.network;
-        let view = View::of(percept, airframe);
-        self.watch((view, airframe), net, (interval, apart_ms));
+        let sight = Sight::of(percept, airframe, town);
+        self.watch((sight, airframe), net, (interval, apart_ms));
         let mut before = core::mem::take(&mut self.tracks);
         for t in tracks.confirmed() {
             let known = carried(&mut before, |a: &Along| a.begun_ms, tracks, t);
             let mut along = known.unwrap_or_else(|| Along::begun(t));
             if now_ms.saturating_sub(t.seen_ms) <= UNSEEN_MS {
-                let looks = (view, airframe);
+                let looks = (sight, airframe);
                 self.step(&mut along, t, (net, looks), (interval, now_ms, apart_ms));
             }
             self.tracks.insert(t.name, along);
@@ -235,22 +236,22 @@ impl Using {
     }
 
     /// Whether a place is this peer's to count at.
-    fn is_own(&self, view: View, airframe: &Airframe, at: Point) -> bool {
-        let in_other = |other: &Pose| View::level(*other, airframe).shows(at, INNER);
-        view.shows(at, INNER) && !self.others.iter().any(in_other)
+    fn is_own(&self, sight: Sight<'_>, airframe: &Airframe, at: Point) -> bool {
+        let in_other = |other: &Pose| sight.of_other(*other, airframe).shows(at, INNER);
+        sight.shows(at, INNER) && !self.others.iter().any(in_other)
     }
 
     fn watch(
         &mut self,
-        (view, airframe): (View, &Airframe),
+        (sight, airframe): (Sight<'_>, &Airframe),
         net: &Network,
         (interval, apart_ms): (u16, u64),
     ) {
-        let (across_m, along_m) = view.reach_m(0.0);
+        let (across_m, along_m) = sight.view.reach_m(0.0);
         let reach_m = across_m + along_m;
         for (i, place) in net.places().iter().enumerate() {
-            let is_near = (place.at - view.from()).norm() <= reach_m;
-            if !is_near || !self.is_own(view, airframe, place.at) {
+            let is_near = (place.at - sight.view.from()).norm() <= reach_m;
+            if !is_near || !self.is_own(sight, airframe, place.at) {
                 continue;
             }
             self.watched.insert(i);
@@ -264,7 +265,7 @@ impl Using {
         &mut self,
         along: &mut Along,
         t: &Track,
-        (net, looks): (&Network, (View, &Airframe)),
+        (net, looks): (&Network, (Sight<'_>, &Airframe)),
         (interval, now_ms, apart_ms): (u16, u64, u64),
     ) {
         let velocity = t.estimate.velocity_mps();
@@ -313,7 +314,7 @@ impl Using {
         net: &Network,
         (from, to): (u16, u16),
         at: Point,
-        (view, airframe): (View, &Airframe),
+        (sight, airframe): (Sight<'_>, &Airframe),
     ) {
         let Some(over) = net.between((from, to), at) else {
             return;
@@ -321,7 +322,7 @@ impl Using {
         let crossing = net.crossings()[usize::from(over)];
         let turn = net.turn(Turn { from, over, to });
         let turn = turn.and_then(|n| u16::try_from(n).ok());
-        if let Some(turn) = turn.filter(|_| self.is_own(view, airframe, crossing)) {
+        if let Some(turn) = turn.filter(|_| self.is_own(sight, airframe, crossing)) {
             let taken = self.turns.entry(turn).or_default();
             *taken = taken.saturating_add(1);
         }

@@ -5,7 +5,7 @@
 //!
 //! | what | beside |
 //! |---|---|
-//! | that it watches a place | whether that is in its picture |
+//! | that it watches a place | whether that is in its picture, and mostly not behind buildings that the mission tells |
 //! | time that vehicles spent, and their speed | those of who truly was at the watched places |
 //! | turns | those that anybody truly took |
 //! | density that all together tell with a range | that of all the interval |
@@ -50,6 +50,10 @@ const SPEED_SURE_SHARE: f64 = 0.5;
 const WATCHED_OFF_SHARE: f64 = 0.03;
 const WATCHED_OFF_M_S: f64 = 1_500.0;
 
+/// And no more of it than this share, and so much, is behind buildings that the mission tells: these
+/// are told to the decimetre, and a place is in the middle of ten metres.
+const HIDDEN_SHARE: f64 = 0.05;
+
 /// Well in the picture is what is in so much of half of it, each way; for so much of the time that
 /// places are well in a picture somebody watches, less some.
 const WELL: f64 = 0.8;
@@ -78,13 +82,15 @@ struct Watcher {
     /// What it told of itself last, with the truth of then.
     told: Option<(Usages, Seen)>,
     turned_from: usize,
+    /// How much of what it watched was hidden from its camera meanwhile, metres times seconds.
+    hidden_m_s: f64,
     /// Turns that were taken while their crossing was in its picture.
     may_turn: u32,
     sight_told: bool,
 }
 
 /// One look of a UAV.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct StreetLook<'a> {
     /// Whose, and in which life.
     pub uav: (u16, u32),
@@ -92,6 +98,8 @@ pub struct StreetLook<'a> {
     pub picture: Picture,
     /// Whether its computer is late: what it says is of where it was.
     pub is_late: bool,
+    /// Whether nothing stands between its camera and a place.
+    pub sees: &'a dyn Fn(Point) -> bool,
     /// The places that it says it watches.
     pub watched: &'a BTreeSet<usize>,
 }
@@ -101,6 +109,8 @@ pub struct StreetLook<'a> {
 pub struct StreetCheck {
     of: u32,
     streets: Option<(Arc<Streets>, Arc<Network>)>,
+    /// Whether the mission tells what hides streets.
+    has_buildings: bool,
     now_ms: u64,
     places: Vec<Point>,
     located: Vec<Located>,
@@ -141,6 +151,7 @@ impl StreetCheck {
             }
         };
         self.streets = Some((Arc::clone(streets), network));
+        self.has_buildings = mission.buildings.is_some();
     }
 
     /// Whether the mission has no streets to measure.
@@ -167,9 +178,10 @@ impl StreetCheck {
         };
         self.note_all(now_ms, truth, (&streets, &network));
         let in_picture = |at: Point, share: f64| look.picture.shows(at, share);
+        let hides = self.has_buildings;
         if self.able.contains(&look.uav.0) {
             for (place, last_ms) in network.places().iter().zip(&mut self.pictured_at) {
-                if in_picture(place.at, WELL) {
+                if in_picture(place.at, WELL) && !(hides && !(look.sees)(place.at)) {
                     let apart_ms = now_ms.saturating_sub(*last_ms);
                     let apart_ms = if apart_ms <= 250 { apart_ms } else { 0 };
                     self.pictured_m_s += place.length_m * secs(apart_ms);
@@ -188,6 +200,9 @@ impl StreetCheck {
         watcher.watched.clone_from(look.watched);
         for place in look.watched.iter().filter_map(|i| network.places().get(*i)) {
             watcher.truth.watched_m_s += place.length_m * secs(apart_ms);
+            if hides && !look.is_late && !(look.sees)(place.at) {
+                watcher.hidden_m_s += place.length_m * secs(apart_ms);
+            }
         }
         for at in &self.located {
             if let Some((stretch, place)) = at.on
@@ -295,6 +310,15 @@ impl StreetCheck {
         let (mut watched, mut turns) = (0.0, (0, 0));
         for ((uav, _), w) in &self.watchers {
             watched += w.truth.watched_m_s;
+            let most_m_s = HIDDEN_SHARE * w.truth.watched_m_s + WATCHED_OFF_M_S;
+            if w.hidden_m_s > most_m_s {
+                found.broken("usage-sight", now_ms, Some(*uav), || {
+                    format!(
+                        "watched streets for {:.0} m s, and houses hid {:.0} of them",
+                        w.truth.watched_m_s, w.hidden_m_s
+                    )
+                });
+            }
             if let Some((told, truth)) = &w.told {
                 check_told((*uav, now_ms), told, truth, found);
                 let told: u32 = told.turns().map(|(_, n)| n).sum();

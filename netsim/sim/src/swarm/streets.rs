@@ -18,7 +18,8 @@ impl Swarm {
             return;
         }
         let id = peer.id();
-        let (Some(mind), Some(body)) = (&peer.peer, self.air.world().body(id)) else {
+        let world = self.air.world();
+        let (Some(mind), Some(body)) = (&peer.peer, world.body(id)) else {
             return;
         };
         let (Some(watched), Some(life)) = (mind.watched_streets(), mind.speaks_in()) else {
@@ -28,6 +29,7 @@ impl Swarm {
             uav: (id, life),
             picture: body.picture(),
             is_late: peer.slow_ms > 0,
+            sees: &|at: Point| world.is_open_to(id, at),
             watched,
         };
         let truth: Vec<Point> = self.air.vehicles().places().collect();

@@ -84,7 +84,8 @@ impl Scene {
                 traffic: skein_behaviors::traffic::Traffic::default(),
                 sightings: skein_behaviors::sightings::Sightings::new([]),
             };
-            let of = (&self.mission, true);
+            let town = self.mission.town();
+            let of = (&self.mission, town.as_deref(), true);
             self.counting.look(&percept, &airframe(), &self.tracks, of);
         }
     }

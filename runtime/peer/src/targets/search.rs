@@ -11,9 +11,9 @@
 //! | where it flies to stays out of view for longer than the way there takes | that is given up |
 //! | it is seen again, or seen by another later | the chances are dropped |
 
-use super::{Fused, INNER, Sought, Targets, shows, standing};
+use super::{Fused, INNER, Sought, Targets, standing};
+use crate::sight::Sight;
 use skein_behaviors::Percept;
-use skein_behaviors::view::View;
 use skein_flight::tracking::chance::ChanceMap;
 use skein_flight::tracking::follower::TargetMotion;
 use skein_flight::tracking::lookout::{Looker, fly_to};
@@ -177,7 +177,7 @@ impl Targets {
         });
         if search.looked_ms + LOOK_MS <= self.now_ms {
             search.looked_ms = self.now_ms;
-            let view = View::of(percept, &airframe);
+            let sight = Sight::of(percept, &airframe, town);
             let by = Searcher {
                 now_ms: self.now_ms,
                 looker: Looker {
@@ -185,8 +185,8 @@ impl Targets {
                     airspeed_mps: airframe.cruise_mps,
                     reach_m: airframe.footprint_across_m.min(airframe.footprint_along_m),
                 },
-                shows: &|p| shows(&view, percept, town, p),
-                pictures: &|p| view.shows(p, INNER),
+                shows: &|p| sight.shows(p, INNER),
+                pictures: &|p| sight.view.shows(p, INNER),
                 may_fly,
             };
             search.aim = search.chances.go_on(streets, &by, search.aim);

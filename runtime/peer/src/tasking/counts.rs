@@ -25,12 +25,11 @@ impl Tasking {
         };
         let counts = !mission.cancelled && !state.silent && !state.stage.ended();
         let (tracks, _) = self.targets.tracks();
+        let of = (mission.as_ref(), state.geometry.town.as_deref(), counts);
         if !mission.counts.is_empty() {
-            self.counting
-                .look(percept, &airframe, tracks, (mission, counts));
+            self.counting.look(percept, &airframe, tracks, of);
         }
-        self.using
-            .look(percept, &airframe, tracks, (mission, counts));
+        self.using.look(percept, &airframe, tracks, of);
     }
 
     /// Heeds who else is above the sites, and tells what is to be told.

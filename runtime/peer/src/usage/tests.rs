@@ -1,6 +1,7 @@
 //! Streets as one peer sees them used, and as several tell of it, on looks made by hand.
 
 use super::*;
+use crate::buildings::{Building, Buildings};
 use crate::streets::tests::block;
 use crate::testing::{airframe, mission};
 use skein_flight::tracking::estimate::Detection;
@@ -48,7 +49,8 @@ impl Scene {
             let seen: Vec<Sighting> = seen.collect();
             self.tracks.look(self.now_ms, &seen, &in_view);
             let percept = percept(self.now_ms, self.at);
-            let counts = (&self.mission, true);
+            let town = self.mission.town();
+            let counts = (&self.mission, town.as_deref(), true);
             self.using.look(&percept, &airframe(), &self.tracks, counts);
         }
     }
@@ -218,6 +220,30 @@ fn streets_that_are_known_alone_are_not_measured() {
     scene.mission.streets = Some(Arc::new(block()));
     scene.look(10.0, &drives);
     assert!(scene.own().watched_m_s() > 0);
+}
+
+#[test]
+fn what_a_house_hides_is_not_watched() {
+    let watched = |roof_dm: Option<u16>| {
+        let mut scene = Scene::new(Point::new(100.0, 112.0));
+        let told = roof_dm.map(|roof_dm| Buildings {
+            all: vec![Building {
+                roof_dm,
+                // A row of houses between the UAV and a part of the street, 60 m below it.
+                ring: vec![(800, 1_010), (1_000, 1_010), (1_000, 1_110), (800, 1_110)],
+            }],
+        });
+        scene.mission.buildings = told.map(Arc::new);
+        scene.look(10.0, &drives);
+        let own = scene.own();
+        own.of_stretch(middle(&own)).watched_m_s
+    };
+    let (free, behind, low) = (watched(None), watched(Some(500)), watched(Some(20)));
+    assert!(
+        behind < free * 3 / 4 && behind > 0,
+        "{behind} m s of {free}"
+    );
+    assert_eq!(low, free);
 }
 
 #[test]

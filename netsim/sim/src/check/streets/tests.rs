@@ -46,6 +46,8 @@ struct Scene {
     network: Network,
     middle: u16,
     is_late: bool,
+    /// Whether a house hides the eastern half, of which the mission tells.
+    hidden: bool,
 }
 
 impl Scene {
@@ -63,6 +65,7 @@ impl Scene {
             middle: u16::try_from(middle.unwrap()).unwrap(),
             network,
             is_late: false,
+            hidden: false,
         }
     }
 
@@ -83,6 +86,7 @@ impl Scene {
                 uav: (1, 1),
                 picture: Picture::level(Pose::new(Point::new(100.0, 100.0), 0.0), (50.0, 50.0)),
                 is_late: self.is_late,
+                sees: &|at: Point| !self.hidden || at.x < 100.0,
                 watched,
             };
             let now_ms = 1_000 + (s * 1000.0).round() as u64;
@@ -167,6 +171,27 @@ fn who_watches_what_is_not_in_its_picture_is_found_and_who_watches_nothing_too()
     scene.look(600, &BTreeSet::new());
     scene.check.on_end(601_000, &mut scene.found);
     assert_eq!(scene.found.counts.keys().next(), Some(&"usage-idle"));
+}
+
+#[test]
+fn who_watches_what_houses_hide_is_found_where_the_mission_tells_of_them() {
+    for (tells, hidden, is_found) in [
+        (true, true, true),
+        (true, false, false),
+        (false, true, false),
+    ] {
+        let mut scene = Scene::new();
+        let mut mission = (*crate::world::fixture::square(1).mission).clone();
+        mission.streets = Some(Arc::new(streets()));
+        mission.buildings = tells.then(Arc::default);
+        scene.check.on_mission(&mission);
+        scene.hidden = hidden;
+        let watched = scene.in_picture();
+        scene.look(90, &watched);
+        scene.check.on_end(91_000, &mut scene.found);
+        let broken = scene.found.counts.contains_key("usage-sight");
+        assert_eq!(broken, is_found, "{tells} {hidden}");
+    }
 }
 
 #[test]
