@@ -155,6 +155,7 @@ impl Rules {
     pub fn on_boot(&mut self, now_ms: u64, id: u16) {
         self.on_silent(id, true);
         self.decision.on_anew(id);
+        self.streets.on_boot(id);
         self.loops.remove(&id);
         self.cadence.on_boot(now_ms, id);
         self.activity.on_boot(now_ms, id);

@@ -125,6 +125,8 @@ pub struct StreetCheck {
     pictured_at: Vec<u64>,
     pictured_m_s: f64,
     watchers: BTreeMap<(u16, u32), Watcher>,
+    /// Those whose process is no more.
+    ended: Vec<(u16, Watcher)>,
     able: BTreeSet<u16>,
     hints: Vec<HintReport>,
     known: Option<Usages>,
@@ -271,6 +273,15 @@ impl StreetCheck {
         Some(Usages::of(streets, network, seen))
     }
 
+    /// A process begins. One that begins without its disk may take itself to be in the life of the
+    /// one before, and knows nothing of what that one counted.
+    pub fn on_boot(&mut self, uav: u16) {
+        let of_it = (uav, u32::MIN)..=(uav, u32::MAX);
+        let lives: Vec<(u16, u32)> = self.watchers.range(of_it).map(|(of, _)| *of).collect();
+        let ended = lives.iter().filter_map(|of| self.watchers.remove(of));
+        self.ended.extend(ended.map(|w| (uav, w)));
+    }
+
     /// What a UAV says that it counted itself in its life.
     pub fn on_own(&mut self, uav: (u16, u32), own: Usages) {
         if let Some(watcher) = self.watchers.get_mut(&uav) {
@@ -308,7 +319,8 @@ impl StreetCheck {
     /// The run is over.
     pub fn on_end(&mut self, now_ms: u64, found: &mut Findings) {
         let (mut watched, mut turns) = (0.0, (0, 0));
-        for ((uav, _), w) in &self.watchers {
+        let of = self.watchers.iter().map(|((uav, _), w)| (uav, w));
+        for (uav, w) in of.chain(self.ended.iter().map(|(uav, w)| (uav, w))) {
             watched += w.truth.watched_m_s;
             let most_m_s = HIDDEN_SHARE * w.truth.watched_m_s + WATCHED_OFF_M_S;
             if w.hidden_m_s > most_m_s {

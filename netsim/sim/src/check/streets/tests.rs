@@ -195,6 +195,24 @@ fn who_watches_what_houses_hide_is_found_where_the_mission_tells_of_them() {
 }
 
 #[test]
+fn a_process_that_begins_in_the_same_life_tells_of_itself_alone() {
+    for boots in [true, false] {
+        let mut scene = Scene::new();
+        let watched = scene.in_picture();
+        scene.look(90, &watched);
+        let told = scene.tells(1.0, 10.0, 0);
+        scene.check.on_own((1, 1), told);
+        if boots {
+            scene.check.on_boot(1);
+        }
+        let nothing = Usages::new(Arc::new(streets()), Arc::new(scene.network.clone()));
+        scene.check.on_own((1, 1), nothing);
+        scene.check.on_end(91_000, &mut scene.found);
+        assert_eq!(scene.found.counts.contains_key("usage"), !boots);
+    }
+}
+
+#[test]
 fn a_hint_that_is_no_way_or_a_slow_one_breaks_the_rule() {
     let watched = |scene: &Scene| {
         let mut told = Usages::new(Arc::new(streets()), Arc::new(scene.network.clone()));
