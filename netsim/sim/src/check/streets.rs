@@ -180,10 +180,11 @@ impl StreetCheck {
         };
         self.note_all(now_ms, truth, (&streets, &network));
         let in_picture = |at: Point, share: f64| look.picture.shows(at, share);
-        let hides = self.has_buildings;
+        let has_buildings = self.has_buildings;
+        let is_open = |at: Point| !has_buildings || (look.sees)(at);
         if self.able.contains(&look.uav.0) {
             for (place, last_ms) in network.places().iter().zip(&mut self.pictured_at) {
-                if in_picture(place.at, WELL) && !(hides && !(look.sees)(place.at)) {
+                if in_picture(place.at, WELL) && is_open(place.at) {
                     let apart_ms = now_ms.saturating_sub(*last_ms);
                     let apart_ms = if apart_ms <= 250 { apart_ms } else { 0 };
                     self.pictured_m_s += place.length_m * secs(apart_ms);
@@ -202,7 +203,7 @@ impl StreetCheck {
         watcher.watched.clone_from(look.watched);
         for place in look.watched.iter().filter_map(|i| network.places().get(*i)) {
             watcher.truth.watched_m_s += place.length_m * secs(apart_ms);
-            if hides && !look.is_late && !(look.sees)(place.at) {
+            if !look.is_late && !is_open(place.at) {
                 watcher.hidden_m_s += place.length_m * secs(apart_ms);
             }
         }
