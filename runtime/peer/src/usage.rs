@@ -5,7 +5,7 @@
 //! |---|---|
 //! | a look, a part of a stretch is in the inner part of the picture, no building that the mission tells before it, and nobody of a lower number has it in its own | that part is watched |
 //! | a confirmed track is on a watched part | the time that it takes and the way that it drives are counted for its stretch, in the interval of the day |
-//! | a track that was well on one stretch is well on another one, and their crossing is in the picture | a turn |
+//! | a track that was well on one stretch is well on another one, for 0.8 s without a break, and their crossing is in the picture | a turn |
 //! | an interval is over, or so many beacon intervals passed since a register was told | it is told, if it grew |
 //! | a usage of another | kept, of each author, life and register the one that says more |
 //! | another life begins, other streets or another sortie | its own counts begin at nothing |
@@ -54,6 +54,10 @@ const UNSEEN_MS: u64 = 700;
 /// Who is so far from both ends of a stretch is well on it, metres; on a short one at its middle.
 const WELL_ON_M: f64 = 15.0;
 
+/// Who is on a stretch for so long without a break is on it indeed, milliseconds: near a crossing
+/// errors of places put a vehicle on one stretch and on the next one in turns.
+const SURE_MS: u64 = 800;
+
 /// Who was not well on any stretch for so long turned somewhere else, milliseconds.
 const TURNED_MS: u64 = 30_000;
 
@@ -67,8 +71,8 @@ pub const KNOWN_MAX: usize = 2_560;
 #[derive(Clone, Copy, Debug)]
 struct Along {
     begun_ms: u64,
-    /// The stretch that it is on.
-    stretch: Option<u16>,
+    /// The stretch that it is on, and since when without a break.
+    stretch: Option<(u16, u64)>,
     /// The stretches and intervals in which it was counted last, the latest first.
     counted: [Option<(u16, u16)>; 3],
     /// The stretch on which it was well last, and when.
@@ -272,15 +276,18 @@ impl Using {
         let stands = velocity.norm() < STILL_MPS;
         let heading = if stands { Vector::zeros() } else { velocity };
         let at = t.estimate.position();
-        let Some(m) = net.matched(at, heading, along.stretch) else {
-            along.stretch = None;
+        let was = along.stretch.take();
+        let Some(m) = net.matched(at, heading, was.map(|(stretch, _)| stretch)) else {
             return;
         };
-        along.stretch = Some(m.edge);
+        let since_ms = was.filter(|(stretch, _)| *stretch == m.edge);
+        let since_ms = since_ms.map_or(now_ms, |(_, since_ms)| since_ms);
+        along.stretch = Some((m.edge, since_ms));
+        let is_sure = now_ms.saturating_sub(since_ms) >= SURE_MS;
         let length_m = net.edges()[usize::from(m.edge)].length_m;
         let from_end_m = m.along_m.min(length_m - m.along_m);
         // A short stretch ends before anybody is fifteen metres from its ends.
-        if !stands && from_end_m >= WELL_ON_M.min(length_m / 4.0) {
+        if !stands && is_sure && from_end_m >= WELL_ON_M.min(length_m / 4.0) {
             let was = along.well.filter(|(_, ms)| ms + TURNED_MS >= now_ms);
             if let Some((from, _)) = was.filter(|(from, _)| *from != m.edge) {
                 self.turned(net, (from, m.edge), at, looks);
