@@ -12,24 +12,26 @@ use skein_geometry::frame::{Point, Pose};
 pub(crate) struct Sight<'a> {
     /// The picture.
     pub view: View,
+    airframe: &'a Airframe,
     height_m: f64,
     town: Option<&'a Town>,
 }
 
 impl<'a> Sight<'a> {
     /// Of a percept.
-    pub fn of(percept: &Percept, airframe: &Airframe, town: Option<&'a Town>) -> Self {
+    pub fn of(percept: &Percept, airframe: &'a Airframe, town: Option<&'a Town>) -> Self {
         Self {
             view: View::of(percept, airframe),
+            airframe,
             height_m: percept.height_m,
             town,
         }
     }
 
     /// Of somebody else, who is taken to have the same airframe, to fly level and as high.
-    pub fn of_other(self, pose: Pose, airframe: &Airframe) -> Self {
+    pub fn of_other(self, pose: Pose) -> Self {
         Self {
-            view: View::level(pose, airframe),
+            view: View::level(pose, self.airframe),
             ..self
         }
     }

@@ -226,36 +226,30 @@ impl Using {
         let interval = followed.streets.interval_at(now_ms);
         let net = &followed.network;
         let sight = Sight::of(percept, airframe, town);
-        self.watch((sight, airframe), net, (interval, apart_ms));
+        self.watch(sight, net, (interval, apart_ms));
         let mut before = core::mem::take(&mut self.tracks);
         for t in tracks.confirmed() {
             let known = carried(&mut before, |a: &Along| a.begun_ms, tracks, t);
             let mut along = known.unwrap_or_else(|| Along::begun(t));
             if now_ms.saturating_sub(t.seen_ms) <= UNSEEN_MS {
-                let looks = (sight, airframe);
-                self.step(&mut along, t, (net, looks), (interval, now_ms, apart_ms));
+                self.step(&mut along, t, (net, sight), (interval, now_ms, apart_ms));
             }
             self.tracks.insert(t.name, along);
         }
     }
 
     /// Whether a place is this peer's to count at.
-    fn is_own(&self, sight: Sight<'_>, airframe: &Airframe, at: Point) -> bool {
-        let in_other = |other: &Pose| sight.of_other(*other, airframe).shows(at, INNER);
+    fn is_own(&self, sight: Sight<'_>, at: Point) -> bool {
+        let in_other = |other: &Pose| sight.of_other(*other).shows(at, INNER);
         sight.shows(at, INNER) && !self.others.iter().any(in_other)
     }
 
-    fn watch(
-        &mut self,
-        (sight, airframe): (Sight<'_>, &Airframe),
-        net: &Network,
-        (interval, apart_ms): (u16, u64),
-    ) {
+    fn watch(&mut self, sight: Sight<'_>, net: &Network, (interval, apart_ms): (u16, u64)) {
         let (across_m, along_m) = sight.view.reach_m(0.0);
         let reach_m = across_m + along_m;
         for (i, place) in net.places().iter().enumerate() {
             let is_near = (place.at - sight.view.from()).norm() <= reach_m;
-            if !is_near || !self.is_own(sight, airframe, place.at) {
+            if !is_near || !self.is_own(sight, place.at) {
                 continue;
             }
             self.watched.insert(i);
@@ -269,7 +263,7 @@ impl Using {
         &mut self,
         along: &mut Along,
         t: &Track,
-        (net, looks): (&Network, (Sight<'_>, &Airframe)),
+        (net, sight): (&Network, Sight<'_>),
         (interval, now_ms, apart_ms): (u16, u64, u64),
     ) {
         let velocity = t.estimate.velocity_mps();
@@ -290,7 +284,7 @@ impl Using {
         if !stands && is_sure && from_end_m >= WELL_ON_M.min(length_m / 4.0) {
             let was = along.well.filter(|(_, ms)| ms + TURNED_MS >= now_ms);
             if let Some((from, _)) = was.filter(|(from, _)| *from != m.edge) {
-                self.turned(net, (from, m.edge), at, looks);
+                self.turned(net, (from, m.edge), at, sight);
             }
             along.well = Some((m.edge, now_ms));
         }
@@ -316,20 +310,14 @@ impl Using {
     }
 
     /// One that was well on a stretch is well on another one.
-    fn turned(
-        &mut self,
-        net: &Network,
-        (from, to): (u16, u16),
-        at: Point,
-        (sight, airframe): (Sight<'_>, &Airframe),
-    ) {
+    fn turned(&mut self, net: &Network, (from, to): (u16, u16), at: Point, sight: Sight<'_>) {
         let Some(over) = net.between((from, to), at) else {
             return;
         };
         let crossing = net.crossings()[usize::from(over)];
         let turn = net.turn(Turn { from, over, to });
         let turn = turn.and_then(|n| u16::try_from(n).ok());
-        if let Some(turn) = turn.filter(|_| self.is_own(sight, airframe, crossing)) {
+        if let Some(turn) = turn.filter(|_| self.is_own(sight, crossing)) {
             let taken = self.turns.entry(turn).or_default();
             *taken = taken.saturating_add(1);
         }
