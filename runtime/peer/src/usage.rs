@@ -12,7 +12,9 @@
 //!
 //! Time and way are those of Edie's definitions over the places and times that were watched, so
 //! density, flow and space-mean speed have no bias by what was looked at how often; as with
-//! [`crate::counting`], of two UAVs above a place one counts, its clock too.
+//! [`crate::counting`], of two UAVs above a place one counts, its clock too. A track that has just
+//! begun seems to drive faster than it does, since errors of its velocity lengthen it on the
+//! average; so what the surer ones say of the speed counts for more, and all time counts as time.
 //!
 //! # Guarantees
 //! Registers merge in any order. Bounded. Without streets nothing is kept and nothing said.
@@ -45,8 +47,14 @@ use std::sync::Arc;
 mod sums;
 pub use sums::{StretchSum, Usages};
 
-/// Slower than this is as good as still, m/s.
+/// The speed of a track whose velocity is so sure, variance of both axes together, m²/s², counts for
+/// a quarter of one that is exact; of one that has just been confirmed, for a thousandth.
+const SURE_M2PS2: f64 = 4.0;
+
+/// Slower than this is as good as still, m/s, and so is what this share of the variance of its
+/// velocity may be: far below errors are as large as what vehicles drive in a jam.
 pub const STILL_MPS: f64 = 2.0;
+const STILL_SHARE: f64 = 0.25;
 
 /// A track that was not seen for longer is not where it is thought to be, milliseconds.
 const UNSEEN_MS: u64 = 700;
@@ -85,7 +93,10 @@ struct Own {
     watched_m_ms: f64,
     spent_ms: u64,
     stood_ms: u64,
+    /// How far they drove, metres, and how long that took, seconds, each time by how much the speed
+    /// of the track counts.
     driven_m: f64,
+    weighed_s: f64,
     vehicles: u16,
 }
 
@@ -267,7 +278,8 @@ impl Using {
         (interval, now_ms, apart_ms): (u16, u64, u64),
     ) {
         let velocity = t.estimate.velocity_mps();
-        let stands = velocity.norm() < STILL_MPS;
+        let still_m2ps2 = STILL_MPS * STILL_MPS + STILL_SHARE * variance_m2ps2(t);
+        let stands = velocity.norm_squared() < still_m2ps2;
         let heading = if stands { Vector::zeros() } else { velocity };
         let at = t.estimate.position();
         let was = along.stretch.take();
@@ -301,11 +313,13 @@ impl Using {
         }
         own.spent_ms += apart_ms;
         own.stood_ms += if stands { apart_ms } else { 0 };
+        let weighed_s = weight(t) * seconds(apart_ms);
+        own.weighed_s += weighed_s;
         // Of who stands, errors of its place to and fro are no way that was driven.
         own.driven_m += if stands {
             0.0
         } else {
-            velocity.norm() * seconds(apart_ms)
+            velocity.norm() * weighed_s
         };
     }
 
@@ -445,18 +459,34 @@ impl Using {
 }
 
 impl Own {
-    /// As it is told: whole numbers that grow.
+    /// As it is told, in whole numbers: the way is that of all the time, by the speed as it counts.
     fn told(&self, stretch: u16) -> StretchUse {
         let ds = |ms: u64| u32::try_from(ms / 100).unwrap_or(MOST).min(MOST);
+        let speed_mps = if self.weighed_s > 0.0 {
+            self.driven_m / self.weighed_s
+        } else {
+            0.0
+        };
         StretchUse {
             stretch,
             watched_m_s: whole(self.watched_m_ms / 1e3),
             spent_ds: ds(self.spent_ms),
             stood_ds: ds(self.stood_ms),
-            driven_m: whole(self.driven_m),
+            driven_m: whole(speed_mps * seconds(self.spent_ms)),
             vehicles: self.vehicles,
         }
     }
+}
+
+/// The variance of a track's velocity, of both axes together.
+fn variance_m2ps2(t: &Track) -> f64 {
+    t.estimate.covariance[(2, 2)] + t.estimate.covariance[(3, 3)]
+}
+
+/// How much the speed of a track counts, from 0 to 1.
+fn weight(t: &Track) -> f64 {
+    let share = SURE_M2PS2 / (SURE_M2PS2 + variance_m2ps2(t));
+    share * share
 }
 
 #[allow(

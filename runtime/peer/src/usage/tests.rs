@@ -6,9 +6,12 @@ use crate::streets::tests::block;
 use crate::testing::{airframe, mission};
 use skein_flight::tracking::estimate::Detection;
 use skein_flight::tracking::tracks::{Kind, Sighting};
+use skein_geometry::random::SplitMix64;
 
-/// A UAV that stands in the air over a place, and sees what drives below without errors.
+/// A UAV that stands in the air over a place, and sees what drives below, without errors at first.
 struct Scene {
+    off_m: f64,
+    random: SplitMix64,
     using: Using,
     tracks: Tracks,
     mission: Mission,
@@ -23,6 +26,8 @@ impl Scene {
         let mut using = Using::new(7);
         using.begin_life(1);
         Self {
+            off_m: 0.0,
+            random: SplitMix64::new(31),
             using,
             tracks: Tracks::new(7, 5.0),
             mission,
@@ -42,9 +47,13 @@ impl Scene {
                 off.x.abs() < flies.footprint_along_m && off.y.abs() < flies.footprint_across_m
             };
             let seen = vehicles(seconds(self.now_ms)).into_iter();
-            let seen = seen.filter(|p| in_view(*p)).map(|p| Sighting {
-                detection: Detection::round(p, 1.0),
-                kind: Kind(1),
+            let (off_m, random) = (self.off_m, &mut self.random);
+            let seen = seen.filter(|p| in_view(*p)).map(|p| {
+                let off = Vector::new(random.normal(), random.normal()) * off_m;
+                Sighting {
+                    detection: Detection::round(p + off, off_m.max(1.0)),
+                    kind: Kind(1),
+                }
             });
             let seen: Vec<Sighting> = seen.collect();
             self.tracks.look(self.now_ms, &seen, &in_view);
@@ -114,6 +123,34 @@ fn time_and_way_on_what_is_watched_give_density_speed_and_flow() {
     assert_eq!(intervals, BTreeSet::from([0, 1]));
     let told = own.sentences();
     assert!(told[0].starts_with("Middle: from 0 s on"), "{told:?}");
+}
+
+/// A UAV flies against those who drive, so each is in the picture for a short time, and places are
+/// off: velocities of tracks that have just begun are lengthened by that.
+#[test]
+fn tracks_that_have_just_begun_tell_no_higher_speed() {
+    for drive_mps in [3.0, 6.0, 9.0] {
+        let all = |s: f64| {
+            let from_m = (0..6).map(|i| 40.0 * f64::from(i));
+            let at = from_m.map(|m| Point::new((m + drive_mps * s) % 240.0 - 20.0, 101.0));
+            at.collect()
+        };
+        let told_mps = (0..4).map(|seed| {
+            let mut scene = Scene::new(Point::new(200.0, 100.0));
+            scene.random = SplitMix64::new(seed);
+            scene.off_m = 2.5;
+            for look in 0..1_500_u32 {
+                scene.at.x = 200.0 - (2.6 * f64::from(look)) % 200.0;
+                scene.look(0.2, &all);
+            }
+            let own = scene.own();
+            own.of_stretch(middle(&own)).speed_mps().unwrap()
+        });
+        let mean_mps = told_mps.sum::<f64>() / 4.0;
+        let off_mps = mean_mps - drive_mps;
+        // All tracks alike would tell 0.36 m/s more at 3 m/s.
+        assert!(off_mps.abs() < 0.03 * drive_mps + 0.1, "{off_mps}");
+    }
 }
 
 #[test]
