@@ -280,7 +280,11 @@ impl Using {
         let velocity = t.estimate.velocity_mps();
         let still_m2ps2 = STILL_MPS * STILL_MPS + STILL_SHARE * variance_m2ps2(t);
         let stands = velocity.norm_squared() < still_m2ps2;
-        let heading = if stands { Vector::zeros() } else { velocity };
+        let heading = if velocity.norm() < STILL_MPS {
+            Vector::zeros()
+        } else {
+            velocity
+        };
         let at = t.estimate.position();
         let was = along.stretch.take();
         let Some(m) = net.matched(at, heading, was.map(|(stretch, _)| stretch)) else {

@@ -415,12 +415,6 @@ fn check_told((uav, now_ms): (u16, u64), told: &Usages, truth: &Seen, found: &mu
         if let (Some(v), Some(truly)) = (says.speed_mps(), is.speed_mps())
             && is.spent_s() >= SPEED_FROM_S
             && sure_s >= SPEED_SURE_SHARE * may_s
-        {
-            eprintln!("DBG {v:.2} {truly:.2} {:.0}", is.spent_s());
-        }
-        if let (Some(v), Some(truly)) = (says.speed_mps(), is.speed_mps())
-            && is.spent_s() >= SPEED_FROM_S
-            && sure_s >= SPEED_SURE_SHARE * may_s
             && (v - truly).abs() > SPEED_OFF_MPS + SPEED_OFF_SHARE * truly
         {
             found.broken("usage", now_ms, Some(uav), || {
