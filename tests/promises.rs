@@ -5,7 +5,8 @@
 //! Statements stay on the air, from where any may reach anybody at any time, in any order,
 //! again or never: that is loss, delay, reordering and repetition. Whoever crashes says
 //! nothing more and hears nothing more, which is one of the ways in which messages get lost.
-//! Time is left out: a proposal may be made, agreed on or withdrawn at any moment.
+//! Time is left out: a proposal may be made, agreed on or withdrawn at any moment. What everybody
+//! has heard, or something newer of its author, is taken off the air: nobody would heed it.
 //!
 //! These bounds are real: so many proposals of each UAV, and of each author's statements the
 //! three newest can still arrive.
@@ -45,6 +46,8 @@ struct Sky {
     uavs: Vec<Promises<Way>>,
     made: Vec<u8>,
     air: Vec<Vec<Statement<Way>>>,
+    /// The number of the newest statement that each heard of each.
+    heard: Vec<Vec<u32>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,6 +77,15 @@ impl Sky {
             }
         }
     }
+
+    /// Takes off the air what nobody would heed.
+    fn clear_air(&mut self) {
+        for (author, air) in self.air.iter_mut().enumerate() {
+            let others = self.heard.iter().enumerate().filter(|(i, _)| *i != author);
+            let least = others.map(|(_, of)| of[author]).min();
+            air.retain(|said| least.is_none_or(|least| said.number > least));
+        }
+    }
 }
 
 impl Model for Case {
@@ -92,6 +104,7 @@ impl Model for Case {
         vec![Sky {
             made: vec![0; uavs.len()],
             air: vec![Vec::new(); uavs.len()],
+            heard: vec![said.iter().map(|s| s.number).collect(); uavs.len()],
             uavs,
         }]
     }
@@ -131,11 +144,13 @@ impl Model for Case {
                 if !next.uavs[to].hear(id(author), said) {
                     return None;
                 }
+                next.heard[to][author] = said.number;
                 to
             }
         };
         let _ = next.uavs[who].settle(true, &|_| true, &apart);
         next.say(who);
+        next.clear_air();
         Some(next)
     }
 
@@ -157,6 +172,7 @@ fn search(case: Case, states: usize) {
     let checker = case.checker().threads(2).spawn_bfs().join();
     checker.assert_properties();
     let found = checker.unique_state_count();
+    println!("{found} states");
     assert!(found >= states, "only {found} states");
 }
 

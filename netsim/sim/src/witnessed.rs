@@ -204,6 +204,7 @@ impl Witnessed {
                 uav,
                 picture: m.picture,
                 is_late: false,
+                sees: &|at: Point| world.is_open_from(m.eye, at),
                 counted: &said.counted,
             };
             let found = &mut self.found;

@@ -31,7 +31,6 @@ use crate::wire::codec::Body;
 use crate::wire::count::Count;
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Percept;
-use skein_behaviors::view::View;
 use skein_flight::airframe::Airframe;
 use skein_flight::tracking::buildings::Town;
 use skein_flight::tracking::tracks::{TargetName, Track, Tracks};
@@ -236,8 +235,6 @@ struct Site {
     since_ms: Option<u64>,
     told: Count,
     told_at: Time,
-    /// Whether somebody of a lower number is above it.
-    is_left_to_another: bool,
 }
 
 /// All that one peer knows of them.
@@ -250,6 +247,8 @@ pub(crate) struct Counting {
     sites: Vec<Site>,
     tracks: BTreeMap<TargetName, Along>,
     last_ms: u64,
+    /// Where others of lower numbers are.
+    others: Vec<Pose>,
     known: Registers<Count, KNOWN_MAX>,
 }
 
@@ -344,7 +343,6 @@ impl Counting {
                 since_ms: None,
                 told: own,
                 told_at: Time(0),
-                is_left_to_another: false,
             })
         };
         self.sites = mission.counts.iter().filter_map(site).collect();
@@ -369,8 +367,9 @@ impl Counting {
         let sight = Sight::of(percept, airframe, town);
         for (i, site) in self.sites.iter_mut().enumerate() {
             let corners = site.outline.vertices();
-            let is_pictured = || corners.iter().all(|p| sight.shows(*p, INNER));
-            let is_watched = counts && !site.is_left_to_another && is_pictured();
+            let shows = |sight: Sight<'_>| corners.iter().all(|p| sight.shows(*p, INNER));
+            let of_another = || self.others.iter().any(|o| shows(sight.of_other(*o)));
+            let is_watched = counts && shows(sight) && !of_another();
             let was = site.since_ms.filter(|_| apart_ms > 0);
             if is_watched && was.is_some() {
                 watched |= 1 << i;
@@ -467,15 +466,8 @@ impl Counting {
 
     /// Where others of lower numbers are now: what one of them has in its picture, that one
     /// counts. They are taken to have the own airframe, and to fly level.
-    pub fn heed(&mut self, others: &[Pose], airframe: &Airframe) {
-        for site in &mut self.sites {
-            let corners = site.outline.vertices();
-            let has = |pose: &Pose| {
-                let view = View::level(*pose, airframe);
-                corners.iter().all(|p| view.shows(*p, INNER))
-            };
-            site.is_left_to_another = others.iter().any(has);
-        }
+    pub fn heed(&mut self, others: Vec<Pose>) {
+        self.others = others;
     }
 
     /// What is to be told now.

@@ -428,6 +428,7 @@ impl Cooperation {
                     self.tasking
                         .was_asked(id, Time(now.0.saturating_sub(*age_ms)));
                 }
+                self.tasking.say_anew();
                 Ok(effects)
             }
         }

@@ -225,6 +225,12 @@ impl Tasking {
         self.known.iter().filter(|(id, _)| id.author == self.me)
     }
 
+    /// What the own operator asked for is said again, also where this life said what it knew of that
+    /// before: what an earlier life said nobody passes on to those who come.
+    pub fn say_anew(&mut self) {
+        self.told_in = 0;
+    }
+
     /// A task was asked for at this time, not when it was heard of.
     pub fn was_asked(&mut self, id: TaskId, since: Time) {
         if let Some(known) = self.known.get_mut(&id) {

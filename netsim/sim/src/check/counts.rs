@@ -7,7 +7,7 @@
 //! | that it counts at a site | whether all of that is in its picture |
 //! | vehicles that it saw drive in | those that did, while it counted |
 //! | vehicles that it saw stand | those that did, when it looked last |
-//! | for how long all together counted | for how long the site was well in the picture of one who could |
+//! | for how long all together counted | for how long the site was well in the picture of one who could, no building that the mission tells before it |
 
 use super::Findings;
 use crate::account::secs;
@@ -260,7 +260,7 @@ struct Watcher {
 }
 
 /// One look of a UAV.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct CountLook<'a> {
     /// Whose.
     pub uav: u16,
@@ -268,6 +268,8 @@ pub struct CountLook<'a> {
     pub picture: Picture,
     /// Whether its computer is late: what it says is of where it was.
     pub is_late: bool,
+    /// Whether nothing stands between its camera and a place.
+    pub sees: &'a dyn Fn(Point) -> bool,
     /// Site by site whether it says that it counts, and what it counted.
     pub counted: &'a [(bool, Count)],
 }
@@ -277,6 +279,8 @@ pub struct CountLook<'a> {
 pub struct CountCheck {
     of: u32,
     sites: Vec<Site>,
+    /// Whether the mission tells what hides sites.
+    has_buildings: bool,
     begun_ms: Option<u64>,
     all: Beside,
     driven: Vec<Driven>,
@@ -299,6 +303,7 @@ impl CountCheck {
     /// The operator has a mission.
     pub fn on_mission(&mut self, mission: &Mission) {
         let of = mission.sites_hash();
+        self.has_buildings = mission.buildings.is_some();
         if mission.counts.is_empty() || (of == self.of && !self.sites.is_empty()) {
             if mission.counts.is_empty() {
                 *self = Self::default();
@@ -320,6 +325,7 @@ impl CountCheck {
             pictured: vec![(0, 0); sites.len()],
             former: vec![(0, 0, Driven::default()); sites.len()],
             sites,
+            has_buildings: self.has_buildings,
             ..Self::default()
         };
     }
@@ -427,8 +433,10 @@ impl CountCheck {
         if !self.able.contains(&look.uav) || look.counted.len() != self.sites.len() {
             return;
         }
+        let has_buildings = self.has_buildings;
         for (site, (last_ms, for_ms)) in self.sites.iter().zip(&mut self.pictured) {
-            if site.is_pictured(look, WELL) {
+            let is_open = || site.outline.vertices().iter().all(|p| (look.sees)(*p));
+            if site.is_pictured(look, WELL) && (!has_buildings || is_open()) {
                 let apart_ms = now_ms.saturating_sub(*last_ms);
                 *for_ms += if apart_ms <= 250 { apart_ms } else { 0 };
                 *last_ms = now_ms;

@@ -26,6 +26,8 @@ struct Orphan {
     owner: Option<u16>,
     /// Who of the dead is taken for its owner by somebody who is to list it.
     claimant: Option<u16>,
+    /// When all who are to list it last took it to be planned by one that is out of their reach.
+    heeded_ms: u64,
     told: bool,
 }
 
@@ -139,13 +141,15 @@ impl ListingCheck {
         let counts_from_ms = stable_ms.max(able_since_ms);
         let expected = self.expected(snapshot, able_since_ms);
         self.note_claims_of_the_dead(snapshot, members, lists);
+        let heeded = self.claimed_by_who_left(snapshot, lists);
         for (cell, lister) in (0..).zip(lister) {
             if lister.is_none() && expected.contains(cell) {
                 self.orphans.remove(&cell);
             } else if settled.contains(cell) || lister.is_some() {
                 self.settle(snapshot, cell, lister, members, counts_from_ms, found);
             } else {
-                self.orphaned(snapshot, cell, members, counts_from_ms, found);
+                let at = (cell, heeded.contains(cell));
+                self.orphaned(snapshot, at, members, counts_from_ms, found);
             }
         }
     }
@@ -196,6 +200,38 @@ impl ListingCheck {
         }
     }
 
+    /// What one that lives and believes all others down is still taken to plan by all who are to
+    /// list it: they heard it claim that, believe that it lives, and did not hear that it is alone.
+    fn claimed_by_who_left(
+        &self,
+        snapshot: &Snapshot<'_>,
+        lists: impl Fn(&PeerSnapshot) -> bool,
+    ) -> CellSet {
+        let n = snapshot.covered.capacity();
+        let left: Vec<u16> = snapshot
+            .peers
+            .iter()
+            .filter(|m| is_alone(&m.view))
+            .map(|m| m.speaks_as)
+            .collect();
+        let mut all: Option<CellSet> = None;
+        for m in snapshot.able().filter(|m| lists(m)) {
+            let claims = left.iter().filter_map(|author| {
+                let (_, status) = m.view.peers.get(&PeerId(*author))?;
+                let (claim, _) = self.heard(m.id, *author)?;
+                let is_heeded = !claim.alone && claim.loop_hash == snapshot.loop_hash;
+                (is_heeded && *status != Status::Down).then_some(claim)
+            });
+            let claimed = claims.flat_map(|c| c.plan.iter().flat_map(|l| cells_of(l.run, n)));
+            let claimed = CellSet::of(n, claimed);
+            match &mut all {
+                Some(all) => all.intersect_with(&claimed),
+                None => all = Some(claimed),
+            }
+        }
+        all.unwrap_or_else(|| CellSet::new(n))
+    }
+
     fn settle(
         &mut self,
         snapshot: &Snapshot<'_>,
@@ -208,7 +244,8 @@ impl ListingCheck {
         if let Some(o) = self.orphans.remove(&cell) {
             let from_ms = counted_from(&o, members)
                 .unwrap_or(snapshot.now_ms)
-                .max(counts_from_ms);
+                .max(counts_from_ms)
+                .max(o.heeded_ms);
             found.took(
                 "L2",
                 snapshot.grade(),
@@ -225,7 +262,7 @@ impl ListingCheck {
     fn orphaned(
         &mut self,
         snapshot: &Snapshot<'_>,
-        cell: u16,
+        (cell, is_heeded): (u16, bool),
         members: &Membership,
         counts_from_ms: u64,
         found: &mut Findings,
@@ -246,13 +283,17 @@ impl ListingCheck {
             since_ms: snapshot.now_ms,
             owner,
             claimant: None,
+            heeded_ms: 0,
             told: false,
         });
+        if is_heeded {
+            o.heeded_ms = snapshot.now_ms;
+        }
         o.claimant = o.claimant.or(self.claimed_by_dead.get(&cell).copied());
         let Some(from_ms) = counted_from(o, members) else {
             return;
         };
-        let counts_from_ms = from_ms.max(counts_from_ms);
+        let counts_from_ms = from_ms.max(counts_from_ms).max(o.heeded_ms);
         let took_ms = snapshot.now_ms.saturating_sub(counts_from_ms);
         let bound_ms = snapshot.takeover_ms(counts_from_ms);
         let graded = snapshot
@@ -391,6 +432,8 @@ mod tests {
         loss: u16,
         /// Who believes all others down.
         alone: Option<u16>,
+        /// What everybody but that one believes of others besides.
+        others: Vec<(u16, Status)>,
     }
 
     impl Story {
@@ -402,15 +445,20 @@ mod tests {
                 stability: Stability::default(),
                 loss,
                 alone: None,
+                others: Vec::new(),
             }
         }
 
-        fn believed(&self, by: u16) -> Status {
-            if self.alone == Some(by) {
+        fn believed(&self, by: u16) -> BTreeMap<PeerId, (u32, Status)> {
+            let is_alone = self.alone == Some(by);
+            let status = if is_alone {
                 Status::Down
             } else {
                 Status::Alive
-            }
+            };
+            let others = self.others.iter().filter(|_| !is_alone);
+            let others = others.map(|(id, status)| (PeerId(*id), (1, *status)));
+            others.chain([(PeerId(99), (1, status))]).collect()
         }
 
         /// One snapshot of a ring of four cells: each peer with its plan.
@@ -431,7 +479,7 @@ mod tests {
                         covered: CellSet::new(4),
                         plan: plan.to_vec(),
                         stamps: vec![stamp(5, *id); plan.len()],
-                        peers: [(PeerId(99), (1, self.believed(*id)))].into(),
+                        peers: self.believed(*id),
                         ..Beliefs::default()
                     },
                 })
@@ -546,6 +594,40 @@ mod tests {
         s.snapshot(42_000, &[(1, &[0, 1, 3, 2])]);
         assert!(s.found.counts.is_empty());
         assert_eq!(s.check.orphans(), 0);
+    }
+
+    /// 2 is out of reach and believes all others down, and 1 takes it to live for so long.
+    #[test]
+    fn what_one_who_left_claimed_counts_from_when_it_is_believed_down() {
+        for (heard, says_alone, broken) in [
+            (true, false, false),
+            (true, true, true),
+            (false, false, true),
+        ] {
+            let mut s = Story::new(0);
+            s.alone = Some(2);
+            let claim = Claim {
+                alone: says_alone,
+                ..(*claim_of_two()).clone()
+            };
+            if heard {
+                s.check.on_heard((1, 2), (1, 1), &Arc::new(claim));
+            }
+            s.others = vec![(2, Status::Alive)];
+            for t in 0..20 {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2, 3])]);
+            }
+            assert_eq!(s.found.counts.contains_key("L2"), broken);
+            s.others = vec![(2, Status::Down)];
+            for t in 20..31 {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2, 3])]);
+            }
+            assert_eq!(s.found.counts.contains_key("L2"), broken);
+            for t in 31..35 {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2, 3])]);
+            }
+            assert!(s.found.counts.contains_key("L2"));
+        }
     }
 
     /// A claim of cells 2 and 3.

@@ -111,7 +111,8 @@ impl Swarm {
             return;
         }
         let id = peer.id();
-        let (Some(mind), Some(body)) = (&peer.peer, self.air.world().body(id)) else {
+        let world = self.air.world();
+        let (Some(mind), Some(body)) = (&peer.peer, world.body(id)) else {
             return;
         };
         let counted: Vec<(bool, Count)> = mind.counted().collect();
@@ -119,6 +120,7 @@ impl Swarm {
             uav: id,
             picture: body.picture(),
             is_late: peer.slow_ms > 0,
+            sees: &|at: Point| world.is_open_to(id, at),
             counted: &counted,
         };
         let truth: Vec<Point> = self.air.vehicles().places().collect();

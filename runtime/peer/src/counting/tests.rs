@@ -1,6 +1,7 @@
 //! Counts of one peer and of several, on looks made by hand.
 
 use super::*;
+use crate::buildings::{Building, Buildings};
 use crate::testing::mission;
 use skein_flight::tracking::estimate::Detection;
 use skein_flight::tracking::tracks::{Kind, Sighting};
@@ -136,7 +137,7 @@ fn who_drove_in_before_the_site_was_watched_or_while_another_counts_does_not_cou
     let near = [(Pose::new(Point::new(8.0, 0.0), 0.0), 200)];
     scene.look(0.2, &|_| Vec::new());
     let others = flown_on(&near, 1_000, &airframe());
-    scene.counting.heed(&others, &airframe());
+    scene.counting.heed(others);
     scene.look(8.0, &|s| vec![car(s)]);
     assert_eq!(
         scene.own(),
@@ -145,12 +146,23 @@ fn who_drove_in_before_the_site_was_watched_or_while_another_counts_does_not_cou
             ..Count::default()
         }
     );
+    // A house stands between that one and a corner, so that one counts nothing either.
+    let house = Building {
+        roof_dm: 500,
+        ring: vec![(110, 70), (140, 70), (140, 80), (110, 80)],
+    };
+    let told = Buildings { all: vec![house] };
+    scene.mission.buildings = Some(std::sync::Arc::new(told));
+    let beside = drives(9.2);
+    scene.look(8.0, &|s| vec![beside(s)]);
+    assert_eq!(scene.own().passed, 1);
+    scene.mission.buildings = None;
     // Of whom nothing was heard any more that one counts no longer.
     let others = flown_on(&[(near[0].0, 3_100)], 1_000, &airframe());
-    scene.counting.heed(&others, &airframe());
-    let car = drives(11.0);
+    scene.counting.heed(others);
+    let car = drives(17.2);
     scene.look(8.0, &|s| vec![car(s)]);
-    assert_eq!(scene.own().passed, 1);
+    assert_eq!(scene.own().passed, 2);
 }
 
 #[test]

@@ -48,7 +48,7 @@ impl Tasking {
         let others: Vec<(Pose, u64)> = lower.filter_map(place).collect();
         let interval_ms = s.membership.interval_ms();
         let others = flown_on(&others, interval_ms, &airframe);
-        self.counting.heed(&others, &airframe);
+        self.counting.heed(others.clone());
         self.using.heed(others);
         if !s.speaks {
             return Effects::new();

@@ -352,3 +352,29 @@ fn what_was_said_to_be_done_stays_so_over_lives() {
     assert_eq!(state(&h, GROUND_STATION, "bus-9.0"), Some(TaskState::Done));
     assert!(h.run_until(600, |h| all_finished(h, [1, 2])));
 }
+
+/// What was asked for before is said by the station that begins anew, also where it hears of that
+/// from its operator a while after it speaks; who comes later knows of it as well.
+#[test]
+fn what_was_asked_for_before_is_said_to_who_comes_later() {
+    let mut h = with_operator(2, mission(1, 8, 4));
+    h.run_s(20);
+    // Nobody carries what it needs, so it stays open.
+    let task = NewTask {
+        sensor: 5,
+        ..point("far", 300.0, 100.0)
+    };
+    add(&mut h, task);
+    let said = h.operators_tasks(GROUND_STATION);
+    h.run_s(2);
+    h.stop(GROUND_STATION);
+    h.stop(2);
+    h.run_s(3);
+    h.start(GROUND_STATION);
+    assert!(h.run_until(30, |h| h.speaks(GROUND_STATION)));
+    h.run_s(3);
+    edit(&mut h, TaskEdit::Again(said));
+    h.run_s(3);
+    h.start(2);
+    assert!(h.run_until(20, |h| state(h, 2, "far") == Some(TaskState::Open)));
+}

@@ -25,6 +25,7 @@ struct Scene {
     found: Findings,
     sites: u32,
     is_late: bool,
+    is_open: bool,
 }
 
 impl Scene {
@@ -38,6 +39,7 @@ impl Scene {
             found: Findings::new(0),
             sites: mission.sites_hash(),
             is_late: false,
+            is_open: true,
         }
     }
 
@@ -61,6 +63,7 @@ impl Scene {
                 is_late: self.is_late,
                 uav: 1,
                 picture: Picture::level(Pose::new(at, 0.0), (40.0, 30.0)),
+                sees: &|_| self.is_open,
                 counted: &counted,
             };
             let now_ms = (s * 1000.0).round() as u64;
@@ -123,6 +126,17 @@ fn who_counts_at_what_is_not_in_its_picture_is_found_and_who_counts_at_nothing_t
     scene.look((0, 40), Point::origin(), &|_| (false, Count::default()));
     scene.check.on_end(40_000, &mut scene.found);
     assert_eq!(scene.broken(), ["count-idle"]);
+    // What buildings hide that the mission tells nobody can count.
+    for is_told in [true, false] {
+        let mut scene = Scene::new(Counted::Passing);
+        scene.is_open = false;
+        let mut mission = mission(Counted::Passing);
+        mission.buildings = is_told.then(std::sync::Arc::default);
+        scene.check.on_mission(&mission);
+        scene.look((0, 40), Point::origin(), &|_| (false, Count::default()));
+        scene.check.on_end(40_000, &mut scene.found);
+        assert_eq!(scene.broken().is_empty(), is_told);
+    }
     // Of whom it is not asked it is not: it is on its way home, say.
     let mut scene = Scene::new(Counted::Passing);
     scene.check.on_able(BTreeSet::new());

@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 /// Farther from a middle line nobody is on its street, metres.
 const ASIDE_M: f64 = 12.0;
 
-/// Who is seen two or three metres beside its place may be taken to be on another stretch that is
-/// no farther than this beyond the nearest one, metres.
-const MAY_M: f64 = 7.0;
+/// Who is seen five metres beside its place, as one in twenty UAVs sees all, may be taken to be on
+/// another stretch that is no farther than this beyond the nearest one, metres.
+const MAY_M: f64 = 10.0;
 
 /// Who is within a crossing, farther from all stretches than this, may as well be taken to be on
 /// none, metres.
