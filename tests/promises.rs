@@ -172,7 +172,6 @@ fn search(case: Case, states: usize) {
     let checker = case.checker().threads(2).spawn_bfs().join();
     checker.assert_properties();
     let found = checker.unique_state_count();
-    println!("{found} states");
     assert!(found >= states, "only {found} states");
 }
 

@@ -51,9 +51,11 @@ pub use sums::{StretchSum, Usages};
 /// a quarter of one that is exact; of one that has just been confirmed, for a thousandth.
 const SURE_M2PS2: f64 = 4.0;
 
-/// Slower than this is as good as still, m/s, and so is what this share of the variance of its
-/// velocity may be: far below errors are as large as what vehicles drive in a jam.
+/// Slower than this is as good as still, m/s.
 pub const STILL_MPS: f64 = 2.0;
+
+/// And so is a speed whose square is larger by no more than this share of the variance of the
+/// velocity: far below errors are as large as what vehicles drive in a jam.
 const STILL_SHARE: f64 = 0.25;
 
 /// A track that was not seen for longer is not where it is thought to be, milliseconds.

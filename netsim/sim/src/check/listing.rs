@@ -192,8 +192,7 @@ impl ListingCheck {
                 if !unknown || claim.alone || claim.loop_hash != snapshot.loop_hash {
                     continue;
                 }
-                let planned = claim.plan.iter().flat_map(|l| cells_of(l.run, n));
-                for cell in planned {
+                for cell in planned(claim, n) {
                     self.claimed_by_dead.insert(cell, *author);
                 }
             }
@@ -222,8 +221,7 @@ impl ListingCheck {
                 let is_heeded = !claim.alone && claim.loop_hash == snapshot.loop_hash;
                 (is_heeded && *status != Status::Down).then_some(claim)
             });
-            let claimed = claims.flat_map(|c| c.plan.iter().flat_map(|l| cells_of(l.run, n)));
-            let claimed = CellSet::of(n, claimed);
+            let claimed = CellSet::of(n, claims.flat_map(|claim| planned(claim, n)));
             match &mut all {
                 Some(all) => all.intersect_with(&claimed),
                 None => all = Some(claimed),
@@ -276,7 +274,7 @@ impl ListingCheck {
                 .into_iter()
                 .flatten()
                 .filter(|((_, author), _)| members.silence(*author).is_some());
-            let mut yielded = silent.filter(|(_, (claim, _))| plans(claim, cell, n));
+            let mut yielded = silent.filter(|(_, (claim, _))| planned(claim, n).any(|c| c == cell));
             owner = yielded.next().map(|((_, author), _)| *author).or(owner);
         }
         let o = self.orphans.entry(cell).or_insert(Orphan {
@@ -396,10 +394,9 @@ fn counted_from(o: &Orphan, members: &Membership) -> Option<u64> {
     })
 }
 
-/// Whether a claim plans a cell that is still to be flown.
-fn plans(claim: &Claim, cell: u16, cells: u16) -> bool {
-    let mut runs = claim.plan.iter();
-    runs.any(|l| cells_of(l.run, cells).any(|c| c == cell))
+/// The cells that a claim plans to fly yet, on a loop of so many.
+fn planned(claim: &Claim, cells: u16) -> impl Iterator<Item = u16> + '_ {
+    claim.plan.iter().flat_map(move |l| cells_of(l.run, cells))
 }
 
 #[cfg(test)]
