@@ -273,6 +273,15 @@ mod tests {
         assert!((3..9).all(|c| !flight.open[c]) && flight.refused == 0);
     }
 
+    /// One that flies under its number is at its slot for good.
+    #[test]
+    fn whose_slot_is_held_sees_its_cells_from_beside_it() {
+        let mut flight = Flight::new();
+        flight.fly(STUCK_MS / 1000 + 60, Some((9, 105.0)));
+        assert!(!flight.executive.changes_layer() && flight.height_m == 102.5);
+        assert!((3..9).all(|c| !flight.open[c]) && flight.refused == 0);
+    }
+
     #[test]
     fn what_has_no_cells_for_it_keeps_its_height_where_others_climb_and_never_descends() {
         let mut flight = Flight::new();

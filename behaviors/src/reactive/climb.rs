@@ -15,6 +15,9 @@
 //! | whoever may be there unseen: there is no sensor, or it holds no more | stays |
 //! | any other | goes |
 //!
+//! Whose own slot another one holds for good, one that flies under the same number, makes for the
+//! nearer of the two rests beside it that are in its layer.
+//!
 //! # Guarantees
 //! Of UAVs that follow this law with the same slots, sense each other without delay and climb at
 //! no less than they say, any two are half a slot apart in height or farther apart on the ground
@@ -227,15 +230,20 @@ impl Climb {
     #[must_use]
     pub fn next_m(&mut self, percept: &Percept, may_descend: bool) -> f64 {
         self.note_others(percept);
-        let (at_m, slot_m) = (percept.height_m, self.slot_m());
+        let (at_m, own_m) = (percept.height_m, self.slot_m());
         let is_at = |to_m: f64| (at_m - to_m).abs() <= AT_M;
-        if is_at(slot_m) {
+        if is_at(own_m) {
             self.to_m = None;
-            return slot_m;
+            return own_m;
         }
+        let slot_m = self.free_m(percept);
         // Between two rests it goes on: it looked before it began.
         if let Some(to_m) = self.to_m.filter(|to| !is_at(*to)) {
             return to_m;
+        }
+        if is_at(slot_m) {
+            self.to_m = None;
+            return slot_m;
         }
         let upwards = slot_m > at_m;
         let mut rests = self.rests_m();
@@ -274,6 +282,24 @@ impl Climb {
             }
         }
         rest_m
+    }
+
+    /// The height that it makes for, metres: its slot, or a rest beside that if another one stays
+    /// there for good and its layer has such a rest.
+    fn free_m(&self, percept: &Percept) -> f64 {
+        let (slot_m, half_m) = (self.slot_m(), self.slots.step_m / 2.0);
+        let is_held = percept.traffic.seen().any(|other| {
+            let is_there = (other.height_m() - slot_m).abs() < self.apart_m();
+            is_there && self.stays_ms(other.id, percept.time_ms) >= STUCK_MS
+        });
+        if !is_held {
+            return slot_m;
+        }
+        let beside = [slot_m - half_m, slot_m + half_m].into_iter();
+        let away_m = |m: &f64| (m - percept.height_m).abs();
+        let nearer = |a: &f64, b: &f64| away_m(a).total_cmp(&away_m(b));
+        let within = beside.filter(|m| self.is_in_layer(*m));
+        within.min_by(nearer).unwrap_or(slot_m)
     }
 
     /// Less than this in height keeps nobody apart, metres: whoever rests half a slot away does.
@@ -347,10 +373,15 @@ impl Climb {
         percept.traffic.is_full() && farthest_m.fold(0.0, f64::max) < within_m
     }
 
+    /// For how long another one is at its height, milliseconds.
+    fn stays_ms(&self, id: u16, now_ms: u64) -> u64 {
+        let since_ms = self.others.get(&id).map_or(now_ms, |o| o.1);
+        now_ms.saturating_sub(since_ms)
+    }
+
     /// Whether another one may be about to change its height: it neither cruises nor is stuck.
     fn may_come(&self, other: &Sighting, now_ms: u64) -> bool {
-        let since_ms = self.others.get(&other.id).map_or(now_ms, |o| o.1);
-        let stays_ms = now_ms.saturating_sub(since_ms);
+        let stays_ms = self.stays_ms(other.id, now_ms);
         let is_at_slot = || {
             let mut slots = self.slots.all_m();
             slots.any(|s| (s - other.height_m()).abs() <= AT_M)
@@ -475,6 +506,46 @@ mod tests {
             .collect();
         assert_eq!(goes(climb(3, 1), 72.5, &crowd), 72.5);
         assert_eq!(goes(climb(3, 1), 72.5, &crowd[1..]), 77.5);
+    }
+
+    #[test]
+    fn whose_slot_another_one_holds_flies_beside_it() {
+        let holder = [other(9, 900.0, 110.0)];
+        let held = |id: u16, height_m: f64, since_ms: u64| {
+            let mut climb = climb(id, 1);
+            let others = [other(9, 900.0, climb.slot_m())];
+            let _ = climb.next_m(&percept(0, height_m, &others), true);
+            climb.to_m = None;
+            climb.next_m(&percept(since_ms, height_m, &others), true)
+        };
+        // From below and from above the nearer side; the lowest and the highest keep to the layer.
+        for (id, from_m, next_m) in [
+            (3, 107.5, 107.5),
+            (3, 112.5, 112.5),
+            (3, 117.5, 112.5),
+            (1, 97.5, 102.5),
+            (8, 137.5, 132.5),
+        ] {
+            assert_eq!(held(id, from_m, STUCK_MS), next_m, "{id} at {from_m}");
+        }
+        // Who may be passing by is waited for, and a slot that is free again is gone to.
+        assert_eq!(held(3, 107.5, STUCK_MS - 1), 107.5);
+        let mut freed = climb(3, 1);
+        let _ = freed.next_m(&percept(0, 107.5, &holder), true);
+        assert_eq!(
+            freed.next_m(&percept(STUCK_MS, 107.5, &holder), true),
+            107.5
+        );
+        assert_eq!(
+            freed.next_m(&percept(STUCK_MS + 200, 107.5, &[]), true),
+            110.0
+        );
+        // Where one UAV alone has a slot there is nothing beside it.
+        let one = Climb::new(slots(1), (1, 0.0), 1, (3.0, 20.0));
+        let mut held_up = one.clone();
+        let _ = held_up.next_m(&percept(0, 97.5, &[other(9, 900.0, 100.0)]), true);
+        let next_m = held_up.next_m(&percept(STUCK_MS, 97.5, &[other(9, 900.0, 100.0)]), true);
+        assert_eq!(next_m, 97.5);
     }
 
     #[test]

@@ -46,6 +46,8 @@ pub struct Beliefs {
     pub adoptions: u32,
     /// What it believes of others.
     pub peers: BTreeMap<PeerId, (Incarnation, Status)>,
+    /// How many more share the work in its eyes, who were to be launched and were never heard of.
+    pub unheard: usize,
     /// The diameter it reckons with.
     pub diameter: u32,
     /// The interval that its beacons announce, milliseconds.

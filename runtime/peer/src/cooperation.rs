@@ -533,6 +533,7 @@ impl Cooperation {
         beliefs.epoch = sections.epoch();
         beliefs.counter = counter;
         beliefs.adoptions = state.negotiation.adoptions;
+        beliefs.unheard = state.company.present().unheard;
         beliefs.finished = state.finished;
         beliefs.relays = state.relay.is_some();
         beliefs.traces = state.executive.as_ref().is_some_and(|e| e.is_tracing());

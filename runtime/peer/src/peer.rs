@@ -620,11 +620,12 @@ impl Peer {
         let (interval, sharers) = (self.relay.air.interval(), self.relay.air.counted());
         let body = if let Some(entries) = entries {
             let (mut gossip, fresh) = self.membership.tell(self.now, entries);
+            let heartbeat = self.outbound.heartbeat().saturating_add(1);
             for g in &mut gossip {
-                (g.max_seq, g.digest) = self.relay.version(g.id, g.incarnation);
+                (g.max_seq, g.digest) = self.relay.version(g.id, g.incarnation, heartbeat);
             }
             Body::Beacon(Beacon {
-                heartbeat: self.outbound.heartbeat().saturating_add(1),
+                heartbeat,
                 nonce: self.life.nonce(),
                 eccentricity: self.membership.eccentricity(self.now),
                 interval,

@@ -42,13 +42,17 @@ pub struct CadenceCheck {
     booted_ms: BTreeMap<u16, u64>,
     /// By author and receiver.
     heard: BTreeMap<(u16, u16), Heard>,
-    /// The highest life in which anybody heard an earlier process of each peer.
+    /// The highest life in which anybody ever heard each peer: who heard it may stand still.
+    lives: BTreeMap<u16, Incarnation>,
+    /// The same for the earlier processes of each peer.
     outlived: BTreeMap<u16, Incarnation>,
     /// What each peer's last beacon announced, milliseconds.
     announced: BTreeMap<u16, u64>,
     /// The longest since its last claim.
     slowest: BTreeMap<u16, u64>,
     accused: Clocks<u16>,
+    /// In which life each was accused last.
+    accused_in: BTreeMap<u16, Incarnation>,
     claims: Clocks<u16>,
 }
 
@@ -60,10 +64,12 @@ impl CadenceCheck {
             period_ms,
             booted_ms: BTreeMap::new(),
             heard: BTreeMap::new(),
+            lives: BTreeMap::new(),
             outlived: BTreeMap::new(),
             announced: BTreeMap::new(),
             slowest: BTreeMap::new(),
             accused: Clocks::default(),
+            accused_in: BTreeMap::new(),
             claims: Clocks::default(),
         }
     }
@@ -72,9 +78,8 @@ impl CadenceCheck {
     pub fn on_boot(&mut self, now_ms: u64, id: u16) {
         self.on_silent(id);
         self.booted_ms.insert(id, now_ms);
-        let lives = self.heard.range((id, 0)..=(id, u16::MAX));
-        if let Some(life) = lives.map(|(_, heard)| heard.incarnation).max() {
-            self.outlived.insert(id, life);
+        if let Some(life) = self.lives.get(&id) {
+            self.outlived.insert(id, *life);
         }
     }
 
@@ -150,6 +155,8 @@ impl CadenceCheck {
         if self.outlived.get(&author) >= Some(&incarnation) {
             return;
         }
+        let life = self.lives.entry(author).or_default();
+        *life = incarnation.max(*life);
         let heard = Heard {
             incarnation,
             at_ms: arrived_ms,
@@ -172,6 +179,7 @@ impl CadenceCheck {
         for told in of_me.filter(|g| g.incarnation == life) {
             if told.suspected_ds.is_some() {
                 self.accused.start(by, now_ms);
+                self.accused_in.insert(by, life);
             } else {
                 // Somebody believes it again: there is nothing to answer any more.
                 self.accused.stop(by);
@@ -235,8 +243,15 @@ impl CadenceCheck {
             // The answer waits a random eighth of the interval, and a quarter after the
             // last beacon; then the peer looks when it said it would. Twice that is a half.
             let answers_ms = self.interval_ms(m.id) / 2;
+            // In a life that an earlier process spoke in it has no answer but a later one, which
+            // is on the disk first.
+            let accused_in = self.accused_in.get(&m.id);
+            let begins_anew = accused_in.is_some() && self.outlived.get(&m.id) >= accused_in;
             let late = self.accused.since(m.id).is_some_and(|t| {
-                snapshot.lived_ms(m.id, t) > answers_ms + snapshot.late_ms(m.id, t)
+                let write_ms = snapshot.handicaps.write_ms(m.id, t, now_ms);
+                let write_ms = if begins_anew { write_ms } else { Some(0) };
+                let late_ms = snapshot.late_ms(m.id, t);
+                write_ms.is_some_and(|w| snapshot.lived_ms(m.id, t) > answers_ms + late_ms + w)
             });
             if late && self.accused.tell_once(m.id) {
                 found.broken("refute", now_ms, Some(m.id), || {
@@ -269,6 +284,7 @@ mod tests {
     use super::super::testing::{Story, speaking};
     use super::*;
     use crate::fault::Fault;
+    use skein_peer::Beliefs;
     use skein_peer::wire::message::Gossip;
 
     fn check() -> (CadenceCheck, Findings) {
@@ -363,9 +379,17 @@ mod tests {
     #[test]
     fn what_a_process_without_its_disk_says_in_an_old_life_proves_nothing() {
         let healthy = Handicaps::default();
-        for (life, broken) in [(4, false), (5, true)] {
+        for (life, stood_still, broken) in [
+            (4, false, false),
+            (5, false, true),
+            (4, true, false),
+            (5, true, true),
+        ] {
             let (mut c, mut found) = check();
             c.on_beacon_heard((50_000, 50_000), (1, 1, 1), (2, 4), &beacon(None));
+            if stood_still {
+                c.on_silent(1);
+            }
             c.on_boot(70_000, 2);
             c.on_beacon_heard((80_000, 80_000), (1, 1, 1), (2, life), &beacon(None));
             c.on_belief(
@@ -375,7 +399,8 @@ mod tests {
                 (1, &healthy),
                 &mut found,
             );
-            assert_eq!(found.counts.contains_key("haste"), broken, "{life}");
+            let is_found = found.counts.contains_key("haste");
+            assert_eq!(is_found, broken, "{life} {stood_still}");
         }
     }
 
@@ -391,6 +416,45 @@ mod tests {
             let views = [(1, speaking())];
             story.snapshot(11_000, &views, |s| c.on_snapshot(s, &mut found));
             assert_eq!(found.counts.contains_key("refute"), !answers);
+        }
+    }
+
+    #[test]
+    fn who_begins_a_later_life_answers_once_that_is_on_its_disk() {
+        for (outlived, slow, broken) in [
+            (false, true, true),
+            (true, false, true),
+            (true, true, false),
+        ] {
+            let (mut c, mut found) = check();
+            let mut story = Story::new(0);
+            if slow {
+                let fault = Fault::SlowStores {
+                    peer: 1,
+                    delay_ms: 660,
+                };
+                story.handicaps.on_fault(9_000, &fault);
+            }
+            if outlived {
+                c.on_heartbeat_heard(5_000, 3, (1, 1), 4);
+                c.on_boot(8_000, 1);
+            }
+            c.on_beacon_heard((10_100, 10_100), (1, 1, 1), (2, 1), &beacon(Some(1)));
+            // It has begun the later one by then, and said nothing in it.
+            let later = Beliefs {
+                incarnation: 2,
+                ..speaking()
+            };
+            story.snapshot(11_000, &[(1, later)], |s| {
+                c.on_snapshot(s, &mut found);
+            });
+            let is_found = found.counts.contains_key("refute");
+            assert_eq!(is_found, broken, "{outlived} {slow}");
+            let mut much_later = Findings::new(1);
+            story.snapshot(16_000, &[(1, speaking())], |s| {
+                c.on_snapshot(s, &mut much_later)
+            });
+            assert!(is_found || much_later.counts.contains_key("refute"));
         }
     }
 

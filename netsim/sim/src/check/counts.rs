@@ -29,12 +29,17 @@ const LEFT_M: f64 = 3.0;
 const STANDS_MPS: f64 = 0.5;
 const MAY_STAND_MPS: f64 = 3.0;
 
-/// A count is off by no more than this, this share of what passed, and this times the root of how
-/// often it was begun: a place that is off by two metres puts one in seven or so of those who drive
-/// over an outline just then on the wrong side of a beginning or an end.
+/// A count is off by no more than this, this share of what passed, the root of how many were near
+/// the outline when it was begun or ended, and how many are now; this times the root of how often it
+/// was begun at least. A UAV's place is off by two metres, a standard deviation each way, and so is
+/// all that it sees for minutes: who drives over the outline just then is on the wrong side of a
+/// beginning or an end.
 const OFF: f64 = 2.0;
 const OFF_SHARE: f64 = 0.1;
 const OFF_BEGUN: f64 = 1.2;
+
+/// Near an outline is who is no farther from it, metres.
+const NEAR_M: f64 = 6.0;
 
 /// Who stands is off by no more than this, and this share of who stands.
 const OCCUPANCY_OFF: f64 = 1.5;
@@ -241,14 +246,37 @@ impl Beside {
     }
 }
 
+/// Where a count may be off.
+#[derive(Clone, Copy, Debug, Default)]
+struct Edges {
+    /// How often it was begun.
+    begun: u32,
+    /// How many were near the outline when it was begun or ended, and at the last look.
+    near: u32,
+    near_now: u32,
+}
+
+impl Edges {
+    fn add(&mut self, more: &Self) {
+        self.begun += more.begun;
+        self.near += more.near;
+        self.near_now += more.near_now;
+    }
+
+    /// By how much it may be off.
+    fn slack(&self) -> f64 {
+        let near = f64::from(self.near + self.near_now).sqrt();
+        near.max(OFF_BEGUN * f64::from(self.begun).sqrt())
+    }
+}
+
 /// One UAV at one site, in one life.
 #[derive(Clone, Debug, Default)]
 struct Watch {
     counts: bool,
     own: Count,
     truth: Driven,
-    /// How often it was begun.
-    begun: u32,
+    edges: Edges,
     told: bool,
 }
 
@@ -378,7 +406,14 @@ impl CountCheck {
                 self.stood.insert((i, look.uav, own.seen_ms), stood);
             }
             let was = watch.counts;
-            watch.begun += u32::from(counts && !was);
+            watch.edges.near_now = site.near(truth);
+            if counts != was {
+                watch.edges.near += watch.edges.near_now;
+                watch.edges.begun += u32::from(counts);
+            }
+            if counts != was || !counts {
+                watch.edges.near_now = 0;
+            }
             (watch.counts, watch.own) = (counts, own);
             let at = (now_ms, look.uav);
             if counts
@@ -472,14 +507,18 @@ impl CountCheck {
         self.check_sums(now_ms, found);
     }
 
-    /// What one UAV counted at all sites together: errors of edges even out, others do not.
+    /// What one UAV counted at all sites that vehicles pass: errors of edges even out, others do
+    /// not.
     fn check_sums(&self, now_ms: u64, found: &mut Findings) {
         for (uav, watcher) in &self.watchers {
-            let all = &watcher.watches;
+            let all = self.sites.iter().zip(&watcher.watches);
+            let passed = all.filter(|(site, _)| site.site.what == Counted::Passing);
+            let all: Vec<&Watch> = passed.map(|(_, watch)| watch).collect();
             let says = all.iter().map(|w| w.own.passed).sum();
             let is = all.iter().map(|w| w.truth.passed).sum();
-            let begun = all.iter().map(|w| w.begun).sum();
-            if is_off(says, is, begun) {
+            let mut edges = Edges::default();
+            all.iter().for_each(|w| edges.add(&w.edges));
+            if is_off(says, is, &edges) {
                 found.broken("count", now_ms, Some(*uav), || {
                     format!("counted {says} vehicles at all sites, and {is} drove in meanwhile")
                 });
@@ -551,6 +590,15 @@ impl CountCheck {
 }
 
 impl Site {
+    /// How many vehicles are near its outline.
+    fn near(&self, truth: &[Point]) -> u32 {
+        let is_near = |p: &&Point| {
+            let apart_m = (**p - self.middle).norm();
+            apart_m <= self.radius_m + NEAR_M && self.outline.outline_distance_m(**p) <= NEAR_M
+        };
+        u32::try_from(truth.iter().filter(is_near).count()).unwrap_or(u32::MAX)
+    }
+
     /// Whether all of it is in so much of a picture, each way.
     fn is_pictured(&self, look: CountLook<'_>, share: f64) -> bool {
         let mut corners = self.outline.vertices().iter();
@@ -559,14 +607,14 @@ impl Site {
 }
 
 /// Whether a count is farther from the truth than it may be.
-fn is_off(says: u32, is: u32, begun: u32) -> bool {
-    let bound = OFF + OFF_SHARE * f64::from(is) + OFF_BEGUN * f64::from(begun).sqrt();
+fn is_off(says: u32, is: u32, edges: &Edges) -> bool {
+    let bound = OFF + OFF_SHARE * f64::from(is) + edges.slack();
     f64::from(says.abs_diff(is)) > bound
 }
 
 fn check_count(site: &Site, watch: &mut Watch, at: (u64, u16), found: &mut Findings) {
     let (says, is) = (watch.own.passed, watch.truth.passed);
-    let off = is_off(says, is, watch.begun);
+    let off = is_off(says, is, &watch.edges);
     if off && site.site.what == Counted::Passing && !core::mem::replace(&mut watch.told, true) {
         found.broken("count", at.0, Some(at.1), || {
             format!(

@@ -247,6 +247,10 @@ impl Membership {
     /// L1: the members of a component believe each other alive, in their present lives.
     fn look_for_disagreement(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let bound_ms = snapshot.bounds.detection_ms();
+        // Who stands still disagrees with nobody, however long it does.
+        let is_there = |id: u16| snapshot.peer(id).is_some();
+        self.disagreements
+            .retain(|(m, x)| is_there(*m) && is_there(*x));
         for m in snapshot.peers {
             for x in snapshot.peers.iter().filter(|x| x.speaks_as != m.speaks_as) {
                 let key = (m.id, x.id);
@@ -492,5 +496,32 @@ mod tests {
             }
             assert_eq!(found.counts.contains_key("L1"), broken, "loss {loss}");
         }
+    }
+
+    /// It disagreed before, and as soon as it goes on it agrees: in between nobody disagrees.
+    #[test]
+    fn who_stands_still_meanwhile_does_not_disagree_all_the_while() {
+        let (mut m, mut found, mut s) = (
+            Membership::default(),
+            Findings::new(1),
+            Stability::default(),
+        );
+        m.on_life(0, 1, 1);
+        m.on_life(0, 2, 1);
+        let down: [Believes<'_>; 2] = [(1, &[(2, 1, Status::Down)]), (2, &[(1, 1, Status::Alive)])];
+        let alone: [Believes<'_>; 1] = [(1, &[(2, 1, Status::Down)])];
+        let alive: [Believes<'_>; 2] =
+            [(1, &[(2, 1, Status::Alive)]), (2, &[(1, 1, Status::Alive)])];
+        for t in 0..90 {
+            let views: &[Believes<'_>] = match t {
+                0..4 => &down,
+                4..60 => &alone,
+                60..62 => &down,
+                _ => &alive,
+            };
+            look_at(&mut m, &mut found, t * 1000, 50, views, &mut s);
+        }
+        let longest = found.ratios["L1"].iter().copied().fold(0.0, f64::max);
+        assert!(longest > 0.0 && longest < 0.5, "{longest}");
     }
 }

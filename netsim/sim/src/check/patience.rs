@@ -48,14 +48,15 @@ struct Joined {
 }
 
 impl Joined {
-    /// Whether a peer that believes this would try the round again.
+    /// Whether a peer that believes this would try the round again. Who was launched and is not
+    /// heard of yet counts too.
     fn holds(&self, me: u16, view: &Beliefs, uavs: &BTreeSet<u16>) -> bool {
         let lives = |id: u16| {
             let believed = view.peers.get(&PeerId(id));
             id == me || believed.is_some_and(|(_, s)| *s != Status::Down)
         };
         let n_uavs = uavs.iter().filter(|id| lives(**id)).count();
-        n_uavs <= MEMBERS_MAX && self.members.iter().all(|m| lives(m.id))
+        n_uavs + view.unheard <= MEMBERS_MAX && self.members.iter().all(|m| lives(m.id))
     }
 }
 
@@ -227,9 +228,9 @@ impl PatienceCheck {
         let lives = |(id, (_, s)): (&PeerId, &(Incarnation, Status))| {
             *s != Status::Down && self.uavs.contains(&id.0)
         };
-        // Among more, orphans are taken without a round.
+        // Among more, whoever is not heard of yet included, orphans are taken without a round.
         let uavs = 1 + view.peers.iter().filter(|p| lives(*p)).count();
-        let few = uavs <= MEMBERS_MAX;
+        let few = uavs + view.unheard <= MEMBERS_MAX;
         if !view.able || !settled || !part.decided || !was_alive || !few {
             return;
         }
@@ -600,6 +601,13 @@ mod tests {
         }
     }
 
+    /// Peer 1 takes so many for alive whom it never heard of.
+    fn expects(check: &mut PatienceCheck, unheard: usize) {
+        check.uavs.insert(2);
+        let view = check.parts.get_mut(&1).and_then(|part| part.view.as_mut());
+        view.expect("a snapshot was judged").unheard = unheard;
+    }
+
     #[test]
     fn a_loss_that_opens_no_round_at_once_is_found() {
         let claim = |count| {
@@ -645,6 +653,10 @@ mod tests {
             ),
             // Five of the longest intervals after a decision.
             (4, false, 2, |check| check.interval_ms = 6000, false),
+            // With six others who were launched and not heard of yet they are eight, with seven
+            // too many.
+            (4, false, 2, |check| expects(check, 6), true),
+            (4, false, 2, |check| expects(check, 7), false),
         ] {
             let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
             check.on_told(adopted_s * 1000, 1, (1, 1));

@@ -523,7 +523,7 @@ impl Relay {
         theirs.sort_by_key(|g| g.id);
         theirs.dedup_by_key(|g| g.id);
         for g in theirs.into_iter().filter(|g| g.id != author) {
-            self.catch_up(now, g.id, g.incarnation, g.max_seq, g.digest);
+            self.catch_up(now, g, beacon.heartbeat);
         }
     }
 
@@ -625,15 +625,15 @@ impl Relay {
         self.wait(now, key, kind, delay);
     }
 
-    /// Queues what a neighbour lacks of one author's records.
-    fn catch_up(
-        &mut self,
-        now: Time,
-        author: u16,
-        incarnation: Incarnation,
-        max_seq: u32,
-        digest: u16,
-    ) {
+    /// Queues what a neighbour lacks of one author's records, as its beacon of this number tells.
+    fn catch_up(&mut self, now: Time, theirs: &Gossip, beacon: u32) {
+        let Gossip {
+            id: author,
+            incarnation,
+            max_seq,
+            digest,
+            ..
+        } = *theirs;
         let quiet = 2 * self.air.interval_ms();
         if self
             .answered
@@ -643,7 +643,7 @@ impl Relay {
             return;
         }
         let life = self.newest_life(author);
-        let (mine_seq, mine_digest) = self.version(author, life);
+        let (mine_seq, mine_digest) = self.version(author, life, beacon);
         if life == 0 || life < incarnation || (life == incarnation && mine_seq < max_seq) {
             return;
         }
@@ -676,15 +676,15 @@ impl Relay {
     }
 
     /// The versions held of an author's records of one life, pieces of missions left out:
-    /// highest `seq`, digest.
+    /// highest `seq`, digest as a beacon of this number tells it.
     #[must_use]
-    pub fn version(&self, author: u16, incarnation: Incarnation) -> (u32, u16) {
+    pub fn version(&self, author: u16, incarnation: Incarnation, beacon: u32) -> (u32, u16) {
         let counted = self.held.range(keys_of(author)).filter(|(key, held)| {
             held.record.incarnation == incarnation && Kind::of_number(key.1).is_some_and(is_counted)
         });
         let versions = counted.map(|(key, held)| (key.1, key.2, held.record.seq));
         let max = versions.clone().map(|(_, _, seq)| seq).max();
-        (max.unwrap_or(0), digest::of(versions))
+        (max.unwrap_or(0), digest::of(versions, beacon))
     }
 
     /// All records held, newest versions, by author, kind and subject.

@@ -112,6 +112,45 @@ fn a_right_count_passes_and_one_that_is_half_or_twice_of_it_does_not() {
     assert!(report.line().contains("truly 20 while it was counted"));
 }
 
+/// Of who drives into a lot nothing is told.
+#[test]
+fn what_passes_where_who_stands_is_counted_is_no_count() {
+    for (what, broken) in [
+        (Counted::Standing, vec![]),
+        (Counted::Passing, vec!["count"]),
+    ] {
+        let mut scene = Scene::new(what);
+        scene.look((0, 80), Point::origin(), &counting(0.0));
+        scene.check.on_end(80_000, &mut scene.found);
+        assert_eq!(scene.broken(), broken, "{what:?}");
+    }
+}
+
+/// A place that is off puts those on the wrong side who drive over the outline just then.
+#[test]
+fn whoever_was_near_the_outline_at_an_edge_of_a_watch_may_be_counted_or_not() {
+    let edges = |begun, near, near_now| Edges {
+        begun,
+        near,
+        near_now,
+    };
+    for (says, edges, off) in [
+        (5, edges(2, 1, 0), true),
+        (5, edges(2, 4, 1), false),
+        (7, edges(2, 4, 1), true),
+        (5, edges(3, 0, 0), false),
+    ] {
+        assert_eq!(is_off(says, 1, &edges), off, "{says} {edges:?}");
+    }
+    let mut scene = Scene::new(Counted::Passing);
+    scene.look((0, 8), Point::origin(), &|s| {
+        (s < 4.0, counting(1.0)(s.min(4.0)).1)
+    });
+    let edges = scene.check.watchers[&1].watches[0].edges;
+    // The parked one stands five metres from it, the other one begins ten metres outside.
+    assert_eq!((edges.begun, edges.near, edges.near_now), (1, 2, 0));
+}
+
 #[test]
 fn who_counts_at_what_is_not_in_its_picture_is_found_and_who_counts_at_nothing_too() {
     let mut scene = Scene::new(Counted::Passing);

@@ -5,11 +5,12 @@
 //! | 0..4 | the number of its state |
 //! | 4..7 | that of its claim |
 //! | 7..9 | that of its bid |
-//! | 9..16 | a hash of all numbers |
+//! | 9..16 | a hash of all numbers and of that of the beacon that tells it |
 //!
 //! The last bits of a number tell neighbouring versions apart for certain, so two digests
 //! tell of which kinds the versions differ, and only these are said again: a lost state,
-//! which people read, does not bring back the claims and the bids of its author.
+//! which people read, does not bring back the claims and the bids of its author. What the hash of
+//! one beacon does not tell apart that of the next one does.
 
 use crate::wire::kinds::Kind;
 use skein_geometry::hash::Fnv;
@@ -24,9 +25,11 @@ fn mask(bits: u32) -> u16 {
     (1 << bits) - 1
 }
 
-/// The digest of records `(number of the kind, subject, seq)`, in ascending order.
-pub(super) fn of(versions: impl Iterator<Item = (u8, u16, u32)>) -> u16 {
+/// The digest of records `(number of the kind, subject, seq)`, in ascending order, as the beacon
+/// of this number tells it.
+pub(super) fn of(versions: impl Iterator<Item = (u8, u16, u32)>, beacon: u32) -> u16 {
     let mut hash = Fnv::new();
+    hash.write(&beacon.to_le_bytes());
     let mut digest = 0;
     for (kind, subject, seq) in versions {
         hash.write(&[kind]);

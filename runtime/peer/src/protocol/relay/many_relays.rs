@@ -134,7 +134,7 @@ impl Net {
         fresh.sort_by_key(|f| f.id);
         fresh.dedup_by_key(|f| f.id);
         for g in &mut gossip {
-            (g.max_seq, g.digest) = node.relay.version(g.id, g.incarnation);
+            (g.max_seq, g.digest) = node.relay.version(g.id, g.incarnation, node.heartbeat);
         }
         let said = Beacon {
             eccentricity: node.membership.eccentricity(now),

@@ -17,6 +17,19 @@ fn record(author: u16, seq: u32) -> Record {
     }
 }
 
+/// The number of a neighbour's beacon.
+const BEACON: u32 = 5;
+
+/// What a beacon tells of the records that its author holds of somebody.
+fn holds(id: u16, incarnation: Incarnation, max_seq: u32, digest: u16) -> Gossip {
+    Gossip {
+        incarnation,
+        max_seq,
+        digest,
+        ..samples::gossip(id)
+    }
+}
+
 /// A relay that has begun: it knows that it is alone.
 fn relay(me: u16) -> Relay {
     let mut relay = Relay::new(me, "f", 64_000, 1000);
@@ -57,10 +70,10 @@ fn what_a_neighbour_lacks_is_sent_again() {
     let mut r = relay(2);
     r.offer(Time(5000), &record(1, 7), &[1; 40], 0);
     assert!(r.poll(Time(5500)).is_some());
-    r.catch_up(Time(9000), 1, 1, 3, 0);
+    r.catch_up(Time(9000), &holds(1, 1, 3, 0), BEACON);
     assert!(r.poll(Time(9500)).is_some());
-    let (seq, digest) = r.version(1, 1);
-    r.catch_up(Time(20_000), 1, 1, seq, digest);
+    let (seq, digest) = r.version(1, 1, BEACON);
+    r.catch_up(Time(20_000), &holds(1, 1, seq, digest), BEACON);
     assert_eq!(r.poll(Time(20_500)), None, "nothing is lacking");
 }
 
@@ -321,7 +334,7 @@ fn a_mission_goes_to_who_lacks_it_and_what_is_due_before_its_next_piece_goes_fir
     for subject in 0..6 {
         r.offer(Time(5_000), &piece(subject, 6), &[1; 200], 0);
     }
-    assert_eq!(r.version(9, 1).0, 0, "pieces are not counted");
+    assert_eq!(r.version(9, 1, BEACON).0, 0, "pieces are not counted");
     assert_eq!(r.poll(Time(7_900)), None, "nobody lacks them");
     r.on_beacon(Time(8_000), 7, &neighbour(1));
     let mut sent = Vec::new();
@@ -484,7 +497,8 @@ fn a_digest_tells_which_records_are_held_and_not_only_the_newest() {
             hole.offer(Time(5000), &record, &[1; 40], 0);
         }
     }
-    let ((seq, digest), (other_seq, other)) = (whole.version(1, 1), hole.version(1, 1));
+    let ((seq, digest), (other_seq, other)) =
+        (whole.version(1, 1, BEACON), hole.version(1, 1, BEACON));
     assert_eq!((seq, other_seq), (6, 6));
     assert_ne!(digest, other);
 }
@@ -508,8 +522,8 @@ fn of_equal_numbers_only_what_differs_is_said_again() {
     };
     let said = |theirs: [u32; 4]| {
         let (mut mine, theirs) = (holding([38, 35, 39, 40]), holding(theirs));
-        let (max_seq, digest) = theirs.version(1, 1);
-        mine.catch_up(Time(20_000), 1, 1, max_seq, digest);
+        let (max_seq, digest) = theirs.version(1, 1, BEACON);
+        mine.catch_up(Time(20_000), &holds(1, 1, max_seq, digest), BEACON);
         let out = (20_000..22_000).filter_map(|t| mine.poll(Time(t)).map(|out| out.bytes[0]));
         let mut out: Vec<u8> = out.collect();
         out.sort_unstable();
@@ -525,6 +539,31 @@ fn of_equal_numbers_only_what_differs_is_said_again() {
     assert_eq!(said([22, 31, 31, 40]), [state, bid, claim, finished]);
     // A lower number is lacking what came later, whatever the digests say.
     assert_eq!(said([38, 35, 0, 0]), [claim, finished]);
+}
+
+#[test]
+fn what_one_beacon_does_not_tell_apart_the_next_one_does() {
+    let bid = |seq| Record {
+        kind: Kind::Bid.number(),
+        ..record(1, seq)
+    };
+    // The last two bits of a bid's number are told, so these are alike but for the hash.
+    let holding = |seq| {
+        let mut r = relay(2);
+        r.offer(Time(5_000), &bid(seq), &[1; 40], 0);
+        r.offer(Time(5_000), &record(1, 1_000), &[1; 40], 0);
+        r
+    };
+    let mine = holding(1);
+    let digest = |r: &Relay, beacon| r.version(1, 1, beacon).1;
+    let mut alike = 0;
+    for theirs in (5..805).step_by(4).map(holding) {
+        let told = |beacon| digest(&mine, beacon) != digest(&theirs, beacon);
+        alike += (0..8).filter(|beacon| !told(*beacon)).count();
+        assert!((0..8).any(told));
+    }
+    // Of 1,600 pairs one in 128.
+    assert!((2..40).contains(&alike), "{alike}");
 }
 
 #[test]
@@ -547,13 +586,13 @@ fn only_what_a_neighbour_lacks_is_sent_again_and_nothing_twice_in_two_periods() 
     };
     assert_eq!(drain(&mut r, 5_000), 4);
     // A neighbour has what came up to the second one.
-    r.catch_up(Time(9_000), 1, 1, 2, 0);
+    r.catch_up(Time(9_000), &holds(1, 1, 2, 0), BEACON);
     assert_eq!(drain(&mut r, 9_000), 2);
     // They were on the air a moment ago: another neighbour has to wait.
-    r.catch_up(Time(11_000), 1, 1, 2, 0);
+    r.catch_up(Time(11_000), &holds(1, 1, 2, 0), BEACON);
     assert_eq!(drain(&mut r, 11_000), 0);
     // Who has the newest but not all of it gets all.
-    r.catch_up(Time(20_000), 1, 1, 4, 0xdead);
+    r.catch_up(Time(20_000), &holds(1, 1, 4, 0xdead), BEACON);
     assert_eq!(drain(&mut r, 20_000), 4);
 }
 
@@ -586,7 +625,7 @@ fn who_knows_an_earlier_life_lacks_all_of_the_later_one_and_who_knows_a_later_on
     };
     r.offer(Time(5_000), &of_life_2, &[1; 40], 0);
     assert!(r.poll(Time(5_500)).is_some());
-    let (seq, digest) = r.version(1, 2);
+    let (seq, digest) = r.version(1, 2, BEACON);
     for (told_life, told_seq, lacks) in [
         // In an earlier life the same numbers mean other records, and it may have
         // written more.
@@ -597,7 +636,7 @@ fn who_knows_an_earlier_life_lacks_all_of_the_later_one_and_who_knows_a_later_on
         (3, seq - 2, false),
     ] {
         let mut r = r.clone();
-        r.catch_up(Time(9_000), 1, told_life, told_seq, digest);
+        r.catch_up(Time(9_000), &holds(1, told_life, told_seq, digest), BEACON);
         let again = (9_000..10_000).filter(|t| r.poll(Time(*t)).is_some());
         assert_eq!(again.count() == 1, lacks, "life {told_life}, {told_seq}");
     }
