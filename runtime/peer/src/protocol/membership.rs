@@ -134,6 +134,8 @@ pub struct Membership {
     changes: u64,
     /// As it was last asked for; nothing where what it follows from changed since.
     extent: Cell<Option<Extent>>,
+    /// Until then somebody is taken to be out of the earshot of another, whatever the diameter.
+    apart_until: Time,
 }
 
 impl Membership {
@@ -155,6 +157,7 @@ impl Membership {
             gone: BTreeSet::new(),
             changes: 0,
             extent: Cell::new(None),
+            apart_until: Time(0),
         }
     }
 
@@ -241,6 +244,17 @@ impl Membership {
         if extent.is_some_and(|e| e.depends_on(id, before, after)) {
             self.extent.set(None);
         }
+    }
+
+    /// Whether somebody is farther than one hop from another, so that heartbeats have to be passed
+    /// on. The diameter says so late: who flies out of earshot counts as near for ten intervals.
+    fn is_far(&self, now: Time) -> bool {
+        self.diameter(now) > 1 || (self.known.len() > MANY && now < self.apart_until)
+    }
+
+    /// Somebody suspects another of whom others hear: not all hear each other.
+    fn note_apart(&mut self, now: Time) {
+        self.apart_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
     }
 
     fn patience(&self, now: Time) -> Patience {
@@ -449,7 +463,7 @@ impl Membership {
             changes,
         );
         if let Some(known) = self.known.get_mut(&told.id)
-            && known.disputes(told)
+            && known.disputes(&heartbeat)
         {
             known.is_news_until(urgent_until);
             self.refuted = true;
@@ -499,6 +513,10 @@ impl Membership {
         limits: Patience,
         changes: &mut Vec<Change>,
     ) {
+        let known = self.known.get(&heartbeat.id);
+        if known.is_some_and(|known| known.disputes(&heartbeat)) {
+            self.note_apart(now);
+        }
         self.hear_question(now, &heartbeat, limits);
         let known = self.known.get_mut(&heartbeat.id);
         if let Some(known) = known.filter(|known| known.has_heard(&heartbeat)) {
@@ -513,7 +531,7 @@ impl Membership {
                 }
             }
         });
-        if self.floods(&limits)
+        if self.floods(now)
             && let Some(known) = self.known.get_mut(&heartbeat.id)
             && known.asks_at_once(now, &limits, self.period_ms)
         {
@@ -522,14 +540,14 @@ impl Membership {
     }
 
     /// Whether what is asked for travels at once.
-    fn floods(&self, patience: &Patience) -> bool {
-        self.known.len() > MANY && patience.is_far
+    fn floods(&self, now: Time) -> bool {
+        self.known.len() > MANY && self.is_far(now)
     }
 
     /// Somebody asks for a heartbeat later than one that is known here, or says what this peer
     /// was to say.
     fn hear_question(&mut self, now: Time, told: &HeardHeartbeat, limits: Patience) {
-        if !self.floods(&limits) {
+        if !self.floods(now) {
             return;
         }
         let verdict_ms = limits.verdict_ms(ms_of(told.interval, self.period_ms));
@@ -630,7 +648,14 @@ impl Membership {
             return false;
         }
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
-        let floods = self.floods(&limits);
+        let is_suspect = |k: &Known| k.status == Status::Suspect && k.freshest.count < heard.count;
+        if heard.hops > 1
+            && known_life == Some(heard.incarnation)
+            && self.known.get(&heard.id).is_some_and(is_suspect)
+        {
+            self.note_apart(now);
+        }
+        let floods = self.floods(now);
         let Some(known) = self.known.get_mut(&heard.id) else {
             if !self.make_room(now) {
                 return false;
@@ -812,7 +837,7 @@ impl Membership {
             self.changes += 1;
         }
         self.bury_unheard(now, patience.bound_ms, &mut changes);
-        if self.floods(&patience) {
+        if self.floods(now) {
             for known in self.known.values_mut() {
                 if known.asks_at_once(now, &patience, self.period_ms) {
                     self.questions.ask(known.freshest.id, known.freshest.count);
@@ -838,7 +863,7 @@ impl Membership {
     fn moment(&self, now: Time) -> Moment {
         Moment {
             now,
-            is_far: self.diameter(now) > 1,
+            is_far: self.is_far(now),
             interval_ms: self.interval_ms(),
             own_interval_ms: self.own_interval_ms(),
             bound_ms: self.patience(now).bound_ms,

@@ -86,8 +86,6 @@ pub(super) fn window_ms(interval: u8, period_ms: u64) -> u64 {
 pub(super) struct Patience {
     /// The longest interval announced, T'.
     pub(super) interval_ms: u64,
-    /// Whether D is more than one hop; else nobody has to be told.
-    pub(super) is_far: bool,
     /// k1, quarters.
     k1_quarters: u64,
     /// Time to refute a suspicion: k2 T'.
@@ -106,7 +104,6 @@ impl Patience {
         let travel_ms = (diameter + 2) * interval_ms;
         Self {
             interval_ms,
-            is_far: diameter > 1,
             k1_quarters,
             k2_ms,
             bound_ms: interval_ms * k1_quarters / 4 + k2_ms + travel_ms,

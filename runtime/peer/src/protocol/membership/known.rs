@@ -365,11 +365,11 @@ impl Known {
     }
 
     /// Whether somebody is told to be suspected who was heard since.
-    pub(super) fn disputes(&self, told: &Gossip) -> bool {
+    pub(super) fn disputes(&self, told: &HeardHeartbeat) -> bool {
         self.status == Status::Alive
-            && told.suspected_ds.is_some()
+            && told.suspected.is_some()
             && told.incarnation == self.freshest.incarnation
-            && told.heartbeat < self.freshest.count
+            && told.count < self.freshest.count
     }
 
     /// Whether a later heartbeat is to be asked for at once, more urgently than before.

@@ -161,3 +161,51 @@ fn among_few_and_where_all_hear_all_nothing_is_asked_at_once() {
         assert!(m.question_at().is_none());
     }
 }
+
+/// Of the diameter is known after ten intervals alone that somebody flew out of earshot.
+#[test]
+fn who_suspects_one_that_others_hear_is_answered_at_once_though_all_were_near() {
+    let of_4 = |heartbeat| Fresh {
+        id: 4,
+        heartbeat,
+        ..asked(0, Some(30))[0]
+    };
+    for (counts, is_far) in [((12, 11), true), ((12, 12), false)] {
+        let (known, told) = counts;
+        let mut m = among_nineteen();
+        m.on_heartbeat(Time(3_000), 4, 1, (known, 4));
+        m.on_others(Time(3_500), 3, &[of_4(told)]);
+        assert_eq!(m.diameter(Time(3_500)), 1);
+        assert_eq!(m.is_far(Time(3_500)), is_far, "{counts:?}");
+        if is_far {
+            assert_eq!(at_once(&mut m, Time(3_600)), [(4, 12, false)]);
+            // So it is for six intervals.
+            assert!(m.is_far(Time(9_499)) && !m.is_far(Time(9_500)));
+        }
+    }
+}
+
+#[test]
+fn whose_own_suspicion_others_refute_is_far_from_somebody() {
+    let of_4 = Fresh {
+        id: 4,
+        suspected_ds: None,
+        ..asked(40, None)[0]
+    };
+    for (silent, is_far) in [(true, true), (false, false)] {
+        let mut m = among_nineteen();
+        let mut now = Time(2_500);
+        for t in 1..24 {
+            now = Time(2_500 + t * 250);
+            for id in (2..=20).filter(|id| !silent || *id != 4) {
+                m.on_heartbeat(now, id, 1, (10 + t as u32, 4));
+            }
+            m.tick(now);
+        }
+        assert_eq!(m.status(4).map(|s| s.1 == Status::Suspect), Some(silent));
+        m.on_others(now, 3, &[of_4]);
+        assert_eq!(m.status(4), Some((1, Status::Alive)));
+        assert_eq!(m.is_far(now), is_far);
+        assert_eq!(m.tell(now, 4).1.len() > 1, is_far, "heartbeats of others");
+    }
+}
