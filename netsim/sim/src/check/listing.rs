@@ -287,7 +287,8 @@ impl ListingCheck {
         if is_heeded {
             o.heeded_ms = snapshot.now_ms;
         }
-        o.claimant = o.claimant.or(self.claimed_by_dead.get(&cell).copied());
+        // One after the other may have claimed it and died.
+        o.claimant = self.claimed_by_dead.get(&cell).copied().or(o.claimant);
         let Some(from_ms) = counted_from(o, members) else {
             return;
         };
@@ -673,6 +674,33 @@ mod tests {
             }
             assert!(s.found.counts.contains_key("L2"), "its time is over");
         }
+    }
+
+    /// 2 and then 3 claimed the same cells and died, before anybody was seen to list them.
+    #[test]
+    fn what_one_dead_one_after_the_other_claimed_counts_from_the_last_detection() {
+        let mut s = Story::new(0);
+        for (id, at_ms) in [(2, 500), (3, 4_500)] {
+            s.members.on_life(0, id, 1);
+            s.check.on_heard((1, id), (1, 1), &claim_of_two());
+            s.members.on_silent(at_ms, id, true, &BOUNDS);
+            s.check.on_death(id);
+            s.snapshot(at_ms + 500, &[(1, &[0, 1])]);
+        }
+        let healthy = Handicaps::default();
+        for (id, at_ms) in [(2, 8_500), (3, 20_500)] {
+            let down = (1, Status::Down);
+            s.members
+                .on_belief(at_ms, (1, id), down, (&BOUNDS, &healthy), None);
+            for t in 1..11 {
+                s.snapshot(at_ms + 500 + t * 1000, &[(1, &[0, 1])]);
+            }
+            assert!(s.found.counts.is_empty(), "{:?}", s.found.violations);
+        }
+        for t in 32..40 {
+            s.snapshot(t * 1000, &[(1, &[0, 1])]);
+        }
+        assert!(s.found.counts.contains_key("L2"));
     }
 
     #[test]
