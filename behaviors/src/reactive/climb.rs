@@ -236,11 +236,11 @@ impl Climb {
             self.to_m = None;
             return own_m;
         }
-        let slot_m = self.free_m(percept);
         // Between two rests it goes on: it looked before it began.
         if let Some(to_m) = self.to_m.filter(|to| !is_at(*to)) {
             return to_m;
         }
+        let slot_m = self.free_m(percept);
         if is_at(slot_m) {
             self.to_m = None;
             return slot_m;
@@ -541,11 +541,11 @@ mod tests {
             110.0
         );
         // Where one UAV alone has a slot there is nothing beside it.
-        let one = Climb::new(slots(1), (1, 0.0), 1, (3.0, 20.0));
-        let mut held_up = one.clone();
-        let _ = held_up.next_m(&percept(0, 97.5, &[other(9, 900.0, 100.0)]), true);
-        let next_m = held_up.next_m(&percept(STUCK_MS, 97.5, &[other(9, 900.0, 100.0)]), true);
-        assert_eq!(next_m, 97.5);
+        let mut alone = Climb::new(slots(1), (1, 0.0), 1, (3.0, 20.0));
+        let holder = [other(9, 900.0, 100.0)];
+        for time_ms in [0, STUCK_MS] {
+            assert_eq!(alone.next_m(&percept(time_ms, 97.5, &holder), true), 97.5);
+        }
     }
 
     #[test]

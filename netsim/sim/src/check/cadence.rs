@@ -245,11 +245,13 @@ impl CadenceCheck {
             let answers_ms = self.interval_ms(m.id) / 2;
             // In a life that an earlier process spoke in it has no answer but a later one, which
             // is on the disk first.
-            let accused_in = self.accused_in.get(&m.id);
-            let begins_anew = accused_in.is_some() && self.outlived.get(&m.id) >= accused_in;
+            let begins_anew = self.outlived.get(&m.id) >= self.accused_in.get(&m.id);
             let late = self.accused.since(m.id).is_some_and(|t| {
-                let write_ms = snapshot.handicaps.write_ms(m.id, t, now_ms);
-                let write_ms = if begins_anew { write_ms } else { Some(0) };
+                let write_ms = if begins_anew {
+                    snapshot.handicaps.write_ms(m.id, t, now_ms)
+                } else {
+                    Some(0)
+                };
                 let late_ms = snapshot.late_ms(m.id, t);
                 write_ms.is_some_and(|w| snapshot.lived_ms(m.id, t) > answers_ms + late_ms + w)
             });

@@ -406,13 +406,13 @@ impl CountCheck {
                 self.stood.insert((i, look.uav, own.seen_ms), stood);
             }
             let was = watch.counts;
-            watch.edges.near_now = site.near(truth);
-            if counts != was {
-                watch.edges.near += watch.edges.near_now;
-                watch.edges.begun += u32::from(counts);
-            }
-            if counts != was || !counts {
+            let near = if counts || was { site.near(truth) } else { 0 };
+            if counts == was {
+                watch.edges.near_now = near;
+            } else {
+                watch.edges.near += near;
                 watch.edges.near_now = 0;
+                watch.edges.begun += u32::from(counts);
             }
             (watch.counts, watch.own) = (counts, own);
             let at = (now_ms, look.uav);

@@ -371,16 +371,18 @@ mod tests {
         m.on_snapshot(&snapshot, found);
     }
 
+    /// Peers 1 and 2 in their first lives, and nothing found.
+    fn two() -> (Membership, Findings, Stability) {
+        let mut m = Membership::default();
+        m.on_life(0, 1, 1);
+        m.on_life(0, 2, 1);
+        (m, Findings::new(1), Stability::default())
+    }
+
     #[test]
     fn a_death_found_in_time_is_no_violation_and_one_missed_is() {
         for found_out in [true, false] {
-            let (mut m, mut found, mut s) = (
-                Membership::default(),
-                Findings::new(1),
-                Stability::default(),
-            );
-            m.on_life(0, 1, 1);
-            m.on_life(0, 2, 1);
+            let (mut m, mut found, mut s) = two();
             m.on_belief(
                 3000,
                 (1, 2),
@@ -482,13 +484,7 @@ mod tests {
     #[test]
     fn disagreement_longer_than_the_bound_breaks_l1_only_without_loss() {
         for (loss, broken) in [(0, true), (50, false), (300, false)] {
-            let (mut m, mut found, mut s) = (
-                Membership::default(),
-                Findings::new(1),
-                Stability::default(),
-            );
-            m.on_life(0, 1, 1);
-            m.on_life(0, 2, 1);
+            let (mut m, mut found, mut s) = two();
             let views: [Believes<'_>; 2] =
                 [(1, &[(2, 1, Status::Down)]), (2, &[(1, 1, Status::Alive)])];
             for t in 0..20 {
@@ -501,13 +497,7 @@ mod tests {
     /// It disagreed before, and as soon as it goes on it agrees: in between nobody disagrees.
     #[test]
     fn who_stands_still_meanwhile_does_not_disagree_all_the_while() {
-        let (mut m, mut found, mut s) = (
-            Membership::default(),
-            Findings::new(1),
-            Stability::default(),
-        );
-        m.on_life(0, 1, 1);
-        m.on_life(0, 2, 1);
+        let (mut m, mut found, mut s) = two();
         let down: [Believes<'_>; 2] = [(1, &[(2, 1, Status::Down)]), (2, &[(1, 1, Status::Alive)])];
         let alone: [Believes<'_>; 1] = [(1, &[(2, 1, Status::Down)])];
         let alive: [Believes<'_>; 2] =

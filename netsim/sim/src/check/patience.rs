@@ -48,16 +48,25 @@ struct Joined {
 }
 
 impl Joined {
-    /// Whether a peer that believes this would try the round again. Who was launched and is not
-    /// heard of yet counts too.
+    /// Whether a peer that believes this would try the round again.
     fn holds(&self, me: u16, view: &Beliefs, uavs: &BTreeSet<u16>) -> bool {
         let lives = |id: u16| {
             let believed = view.peers.get(&PeerId(id));
             id == me || believed.is_some_and(|(_, s)| *s != Status::Down)
         };
-        let n_uavs = uavs.iter().filter(|id| lives(**id)).count();
-        n_uavs + view.unheard <= MEMBERS_MAX && self.members.iter().all(|m| lives(m.id))
+        are_few(view, uavs) && self.members.iter().all(|m| lives(m.id))
     }
+}
+
+/// Whether a peer that believes this takes no more UAVs to be there than may share a round, itself
+/// and whoever was launched and is not heard of yet included. Among more, orphans are taken without
+/// one.
+fn are_few(view: &Beliefs, uavs: &BTreeSet<u16>) -> bool {
+    let lives = |(id, (_, s)): (&PeerId, &(Incarnation, Status))| {
+        *s != Status::Down && uavs.contains(&id.0)
+    };
+    let others = view.peers.iter().filter(|p| lives(*p)).count();
+    1 + others + view.unheard <= MEMBERS_MAX
 }
 
 /// One peer's part.
@@ -225,12 +234,7 @@ impl PatienceCheck {
             .is_some_and(|t| handicaps.lived_ms(observer, t, now_ms) > settled_ms);
         let believed = view.peers.get(&PeerId(subject));
         let was_alive = believed.is_some_and(|(i, s)| *i == incarnation && *s != Status::Down);
-        let lives = |(id, (_, s)): (&PeerId, &(Incarnation, Status))| {
-            *s != Status::Down && self.uavs.contains(&id.0)
-        };
-        // Among more, whoever is not heard of yet included, orphans are taken without a round.
-        let uavs = 1 + view.peers.iter().filter(|p| lives(*p)).count();
-        let few = uavs + view.unheard <= MEMBERS_MAX;
+        let few = are_few(view, &self.uavs);
         if !view.able || !settled || !part.decided || !was_alive || !few {
             return;
         }

@@ -648,11 +648,8 @@ impl Membership {
             return false;
         }
         let urgent_until = now.plus_ms(URGENT_INTERVALS * self.own_interval_ms());
-        let is_suspect = |k: &Known| k.status == Status::Suspect && k.freshest.count < heard.count;
-        if heard.hops > 1
-            && known_life == Some(heard.incarnation)
-            && self.known.get(&heard.id).is_some_and(is_suspect)
-        {
+        let known = self.known.get(&heard.id);
+        if known.is_some_and(|known| known.is_refuted_by(&heard)) {
             self.note_apart(now);
         }
         let floods = self.floods(now);

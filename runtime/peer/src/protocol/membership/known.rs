@@ -372,6 +372,14 @@ impl Known {
             && told.count < self.freshest.count
     }
 
+    /// Whether another knows a later heartbeat of this one, which is suspected here.
+    pub(super) fn is_refuted_by(&self, told: &HeardHeartbeat) -> bool {
+        self.status == Status::Suspect
+            && told.hops > 1
+            && told.incarnation == self.freshest.incarnation
+            && told.count > self.freshest.count
+    }
+
     /// Whether a later heartbeat is to be asked for at once, more urgently than before.
     pub(super) fn asks_at_once(&mut self, now: Time, patience: &Patience, period_ms: u64) -> bool {
         if self.status == Status::Down {
