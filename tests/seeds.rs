@@ -1,15 +1,18 @@
 //! Replays the seeds that once failed (`tests/seeds/*.txt`: scenario, seed, `storm` if its
-//! faults are drawn, where the UAVs begin, `own` for where the scenario says, one a line). Each must complete and break no rule, and the first must give the same history
-//! twice.
+//! faults are drawn, where the UAVs begin, `own` for where the scenario says, one a line). Each
+//! must complete and break no rule, and the first must give the same history twice.
 
 use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
 use skein_netsim::spec::Spec;
+use skein_netsim::swarm::Outcome;
 use skein_netsim::world::fixture;
 use skein_scenario::{Launch, Overrides, builtin_files, builtin_text, open, parse_with};
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, OnceLock};
+use std::thread::{available_parallelism, scope};
 
 /// UAVs of the small scenarios.
 const N_UAVS: u16 = 8;
@@ -49,60 +52,109 @@ fn walls() -> Spec {
     scenario.expect("it can be flown").spec
 }
 
-#[test]
-fn seeds_that_once_failed_hold() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("seeds");
-    let mut files: Vec<_> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|f| f.unwrap().path())
-        .collect();
-    files.sort();
-    let mut prepared_by_name: BTreeMap<String, (Prepared, u64)> = BTreeMap::new();
-    let (mut replayed, mut failed) = (0, Vec::new());
-    for file in files {
-        let text = std::fs::read_to_string(&file).unwrap();
-        for line in text
-            .lines()
-            .map(str::trim)
-            .filter(|l| !l.is_empty() && !l.starts_with('#'))
-        {
-            let words: Vec<&str> = line.split_whitespace().collect();
-            let [scenario, seed, storm @ .., launch] = words.as_slice() else {
-                panic!(
-                    "{}: {line:?} needs a scenario, a seed and a launch",
-                    file.display()
-                );
-            };
-            let launch: Option<Launch> = (*launch != "own").then(|| launch.parse().unwrap());
-            let seed: u64 = seed.parse().unwrap();
-            let (prepared, free_ms) = prepared_by_name
-                .entry(format!("{scenario} {launch:?}"))
-                .or_insert_with(|| {
-                    let prepared = prepared(scenario, launch);
-                    let free_ms = runs::failure_free_makespan_ms(&prepared);
-                    (prepared, free_ms)
-                });
-            let run = || match storm {
-                ["storm"] => runs::storm(prepared, seed, *free_ms, Wanted::default()),
-                [] => runs::planned(prepared, seed, Wanted::default()),
-                other => panic!("{}: unknown flags {other:?}", file.display()),
-            };
-            let first = run();
-            let report = &first.report;
-            if !report.passed {
-                failed.push(format!(
-                    "{line}: {:?} {:#?}",
-                    report.reasons,
-                    first.violations().iter().take(3).collect::<Vec<_>>()
-                ));
-            }
-            // Once is enough to see that a run repeats itself; a run costs about a second.
-            if replayed == 0 {
-                assert_eq!(first.history_hash, run().history_hash, "{line}");
-            }
-            replayed += 1;
+/// One kept line.
+struct Kept {
+    line: String,
+    scenario: String,
+    seed: u64,
+    is_storm: bool,
+    launch: Option<Launch>,
+}
+
+impl Kept {
+    /// # Panics
+    /// If a line cannot be read: it names the file.
+    fn read(file: &Path, line: &str) -> Self {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let (scenario, seed, is_storm, launch) = match words.as_slice() {
+            [scenario, seed, launch] => (scenario, seed, false, launch),
+            [scenario, seed, "storm", launch] => (scenario, seed, true, launch),
+            _ => panic!(
+                "{}: {line:?} needs a scenario, a seed, perhaps the word storm, and a launch",
+                file.display()
+            ),
+        };
+        Self {
+            line: line.to_owned(),
+            scenario: (*scenario).to_owned(),
+            seed: seed.parse().unwrap(),
+            is_storm,
+            launch: (*launch != "own").then(|| launch.parse().unwrap()),
         }
     }
-    assert!(replayed > 0, "no seed was replayed");
+
+    /// Of one scenario and launch all is prepared once.
+    fn place(&self) -> String {
+        format!("{} {:?}", self.scenario, self.launch)
+    }
+
+    fn fly(&self, (prepared, free_ms): &(Prepared, u64)) -> Outcome {
+        if self.is_storm {
+            runs::storm(prepared, self.seed, *free_ms, Wanted::default())
+        } else {
+            runs::planned(prepared, self.seed, Wanted::default())
+        }
+    }
+
+    /// What it broke, if anything.
+    fn failure(&self, outcome: &Outcome) -> Option<String> {
+        let (report, broken) = (&outcome.report, outcome.violations());
+        let first: Vec<_> = broken.iter().take(3).collect();
+        (!report.passed).then(|| format!("{}: {:?} {first:#?}", self.line, report.reasons))
+    }
+}
+
+/// All kept lines, by file.
+fn kept() -> Vec<Kept> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("seeds");
+    let files = std::fs::read_dir(folder).unwrap();
+    let mut files: Vec<_> = files.map(|f| f.unwrap().path()).collect();
+    files.sort();
+    let of_file = |file: PathBuf| {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let lines = text.lines().map(str::trim);
+        let lines = lines.filter(|l| !l.is_empty() && !l.starts_with('#'));
+        lines
+            .map(|line| Kept::read(&file, line))
+            .collect::<Vec<_>>()
+    };
+    files.into_iter().flat_map(of_file).collect()
+}
+
+/// Flown by all processors: it is the last test of its binary, and the longest.
+#[test]
+fn seeds_that_once_failed_hold() {
+    let kept = kept();
+    assert!(!kept.is_empty(), "no seed is kept");
+    let places: BTreeMap<String, OnceLock<(Prepared, u64)>> =
+        kept.iter().map(|k| (k.place(), OnceLock::new())).collect();
+    let (next, failed) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let work = || {
+        while let Some(kept) = kept.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let place = places[&kept.place()].get_or_init(|| {
+                let prepared = prepared(&kept.scenario, kept.launch);
+                let free_ms = runs::failure_free_makespan_ms(&prepared);
+                (prepared, free_ms)
+            });
+            let broken = kept.failure(&kept.fly(place));
+            failed.lock().unwrap().extend(broken);
+        }
+    };
+    let workers = available_parallelism().map_or(1, usize::from);
+    scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(work);
+        }
+    });
+    let mut failed = failed.into_inner().unwrap();
+    failed.sort();
     assert!(failed.is_empty(), "{}", failed.join("\n"));
+    // Once is enough to see that a run repeats itself.
+    let first = &kept[0];
+    let again = [(); 2].map(|()| first.fly(places[&first.place()].get().unwrap()));
+    assert_eq!(
+        again[0].history_hash, again[1].history_hash,
+        "{}",
+        first.line
+    );
 }

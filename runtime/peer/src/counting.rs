@@ -6,7 +6,7 @@
 //! | a look, all of a site is in the inner part of the picture, no building that the mission tells before a corner of it, and nobody of a lower number has it in its own | the site is watched |
 //! | a vehicle that was outside of a site is inside, while that is watched | it passes, once it is known to drive |
 //! | a vehicle is inside of a watched site | the time that it takes and the way that it drives are counted |
-//! | a site is watched for three seconds, from not too high up | who stands in it is counted anew |
+//! | a site is watched for three seconds, from not too high up, and no more than one is seen in it besides who stands | who stands in it is counted anew |
 //! | a site is watched no more, or was for ten intervals since it was told | what was counted there is told |
 //! | a count of another | kept, of each author and life the newest |
 //! | another life begins, other sites or another sortie | its own counts begin at nothing |
@@ -31,6 +31,7 @@ use crate::wire::codec::Body;
 use crate::wire::count::Count;
 use serde::{Deserialize, Serialize};
 use skein_behaviors::Percept;
+use skein_behaviors::sightings::Sighted;
 use skein_flight::airframe::Airframe;
 use skein_flight::tracking::buildings::Town;
 use skein_flight::tracking::tracks::{TargetName, Track, Tracks};
@@ -82,6 +83,10 @@ const SHARP_MM: u64 = 1_100;
 /// Who stands there is the most that one of so many looks tells: one is missed for a look more
 /// often than there is one too many.
 const LOTS: usize = 5;
+
+/// In a look so many are seen in a site, in the mean, besides who stands there: one that drives
+/// through. Where more are, who stands is taken for one that drives, as its neighbours are for it.
+const BESIDES: u32 = 1;
 
 /// Counts that are said at a time.
 const SAID: usize = 2;
@@ -229,8 +234,8 @@ struct Site {
     outline: Polygon,
     own: Count,
     driven_m: f64,
-    /// Who stood there in the last looks of this watch.
-    stood: [Option<u16>; LOTS],
+    /// How many stood there in the last looks of this watch, and how many were seen there.
+    stood: [Option<(u16, u32)>; LOTS],
     /// Since when it is watched in one go, by the clock of percepts.
     since_ms: Option<u64>,
     told: Count,
@@ -454,12 +459,13 @@ impl Counting {
                 continue;
             }
             let standing = tracks.confirmed().filter(stands);
-            let inside = standing.filter(|t| site.outline.contains(t.estimate.position()));
+            let standing = standing.filter(|t| site.outline.contains(t.estimate.position()));
+            let standing = u16::try_from(standing.count()).unwrap_or(u16::MAX);
+            let seen = inside(percept, &site.outline).map(|_| 1_u32).sum();
             site.stood.rotate_left(1);
-            site.stood[LOTS - 1] = Some(u16::try_from(inside.count()).unwrap_or(u16::MAX));
-            let most = site.stood.iter().flatten().max();
-            if let (Some(most), None) = (most, site.stood.iter().find(|n| n.is_none())) {
-                (site.own.standing, site.own.seen_ms) = (*most, now_ms);
+            site.stood[LOTS - 1] = Some((standing, seen));
+            if let Some(most) = surely_standing(&site.stood) {
+                (site.own.standing, site.own.seen_ms) = (most, now_ms);
             }
         }
     }
@@ -553,16 +559,29 @@ pub(crate) fn flown_on(others: &[(Pose, u64)], interval_ms: u64, airframe: &Airf
     fresh.map(now).collect()
 }
 
+/// What is seen inside of an outline in one look, whatever it does.
+fn inside<'a>(percept: &'a Percept, outline: &'a Polygon) -> impl Iterator<Item = &'a Sighted> {
+    let seen = percept.sightings.seen();
+    seen.filter(|s| outline.contains(s.at()))
+}
+
 /// Whether who stands at a place is seen sharply enough to be told apart.
 fn is_sharp(percept: &Percept, outline: &Polygon) -> bool {
-    let inside = percept
-        .sightings
-        .seen()
-        .filter(|s| outline.contains(s.at()));
-    let (n, sum_mm) = inside.fold((0_u64, 0_u64), |(n, sum), s| {
+    let (n, sum_mm) = inside(percept, outline).fold((0_u64, 0_u64), |(n, sum), s| {
         (n + 1, sum + u64::from(s.spread_mm))
     });
     sum_mm <= n * SHARP_MM
+}
+
+/// How many stand at a site by its last looks; none where these are too few yet, or show more than
+/// stand there and drive through.
+fn surely_standing(looks: &[Option<(u16, u32)>; LOTS]) -> Option<u16> {
+    let all: Option<Vec<(u16, u32)>> = looks.iter().copied().collect();
+    let all = all?;
+    let most = all.iter().map(|(standing, _)| *standing).max()?;
+    let seen: u32 = all.iter().map(|(_, seen)| seen).sum();
+    let many: u32 = all.iter().map(|_| u32::from(most) + BESIDES).sum();
+    (seen <= many).then_some(most)
 }
 
 #[allow(

@@ -66,6 +66,13 @@ impl Scene {
             });
             let seen: Vec<Sighting> = seen.collect();
             self.tracks.look(self.now_ms, &seen, &in_view);
+            let mm = |m: f64| (m * 1000.0).round() as i32;
+            let sighted = seen.iter().map(|s| Sighted {
+                east_mm: mm(s.detection.at.x),
+                north_mm: mm(s.detection.at.y),
+                spread_mm: 1_000,
+                kind: CAR.0,
+            });
             let percept = Percept {
                 time_ms: self.now_ms,
                 pose: Pose::new(self.at, 0.0),
@@ -83,7 +90,7 @@ impl Scene {
                 failsafe: false,
                 circles_per_m: None,
                 traffic: skein_behaviors::traffic::Traffic::default(),
-                sightings: skein_behaviors::sightings::Sightings::new([]),
+                sightings: skein_behaviors::sightings::Sightings::new(sighted),
             };
             let town = self.mission.town();
             let of = (&self.mission, town.as_deref(), true);
@@ -188,6 +195,32 @@ fn who_stands_is_counted_at_the_last_look_and_who_drives_by_is_not() {
         text.starts_with("north: 1 of 4 (25 %) stood there"),
         "{text}"
     );
+}
+
+/// In a dense lot those who stand are taken for each other, and then for ones that drive.
+#[test]
+fn where_more_are_seen_than_stand_and_one_that_drives_by_nothing_is_counted() {
+    let mut scene = Scene::new(Counted::Standing);
+    let round = |s: f64, turn: f64| {
+        let angle_rad = 0.6 * s + turn;
+        Point::new(12.0 * angle_rad.cos(), 12.0 * angle_rad.sin())
+    };
+    let stands = Point::origin();
+    for (for_s, drive, standing) in [(5.0, 1, 1), (9.0, 0, 1), (9.0, 2, 1)] {
+        let begun_ms = scene.now_ms;
+        scene.look(for_s, &|s| {
+            let turns = (0..drive).map(|i| 3.0 * f64::from(i));
+            turns.map(|t| round(s, t)).chain([stands]).collect()
+        });
+        let own = scene.own();
+        assert_eq!(own.standing, standing, "{drive} drive: {own:?}");
+        let counted_after_ms = own.seen_ms.saturating_sub(begun_ms);
+        assert_eq!(
+            counted_after_ms > 3_000,
+            drive < 2,
+            "{drive} drive: {own:?}"
+        );
+    }
 }
 
 #[test]

@@ -58,10 +58,6 @@ pub const MAX_KNOWN: usize = PEERS_MAX - 1;
 /// What was not told of within so many intervals is no news any more.
 const URGENT_INTERVALS: u64 = 6;
 
-/// Who knows more others than this may be several hops from some, of whom not all fit into a
-/// beacon.
-const MANY: usize = 8;
-
 /// Whoever knows a later heartbeat of somebody says so at once, once in so many intervals.
 const ANSWER_INTERVALS: u64 = 2;
 
@@ -249,7 +245,7 @@ impl Membership {
     /// Whether somebody is farther than one hop from another, so that heartbeats have to be passed
     /// on. The diameter says so late: who flies out of earshot counts as near for ten intervals.
     fn is_far(&self, now: Time) -> bool {
-        self.diameter(now) > 1 || (self.known.len() > MANY && now < self.apart_until)
+        self.diameter(now) > 1 || now < self.apart_until
     }
 
     /// Somebody suspects another of whom others hear: not all hear each other.
@@ -531,7 +527,7 @@ impl Membership {
                 }
             }
         });
-        if self.floods(now)
+        if self.is_far(now)
             && let Some(known) = self.known.get_mut(&heartbeat.id)
             && known.asks_at_once(now, &limits, self.period_ms)
         {
@@ -539,15 +535,10 @@ impl Membership {
         }
     }
 
-    /// Whether what is asked for travels at once.
-    fn floods(&self, now: Time) -> bool {
-        self.known.len() > MANY && self.is_far(now)
-    }
-
     /// Somebody asks for a heartbeat later than one that is known here, or says what this peer
     /// was to say.
     fn hear_question(&mut self, now: Time, told: &HeardHeartbeat, limits: Patience) {
-        if !self.floods(now) {
+        if !self.is_far(now) {
             return;
         }
         let verdict_ms = limits.verdict_ms(ms_of(told.interval, self.period_ms));
@@ -652,7 +643,7 @@ impl Membership {
         if known.is_some_and(|known| known.is_refuted_by(&heard)) {
             self.note_apart(now);
         }
-        let floods = self.floods(now);
+        let floods = self.is_far(now);
         let Some(known) = self.known.get_mut(&heard.id) else {
             if !self.make_room(now) {
                 return false;
@@ -834,7 +825,7 @@ impl Membership {
             self.changes += 1;
         }
         self.bury_unheard(now, patience.bound_ms, &mut changes);
-        if self.floods(now) {
+        if self.is_far(now) {
             for known in self.known.values_mut() {
                 if known.asks_at_once(now, &patience, self.period_ms) {
                     self.questions.ask(known.freshest.id, known.freshest.count);
