@@ -346,7 +346,9 @@ mod tests {
                 prop_assert!(nearest_m >= told_m - 1e-6, "{nearest_m} {told_m}");
             }
             if !unlike {
-                prop_assert!(nearest_m <= told_m + 0.1, "{nearest_m} {told_m}");
+                // Between two looks, a twentieth of a second apart, they move by two metres against
+                // each other at most, and by one from the nearer one.
+                prop_assert!(nearest_m <= told_m.hypot(1.0) + 0.1, "{nearest_m} {told_m}");
             }
         }
 

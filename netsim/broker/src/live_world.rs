@@ -12,6 +12,10 @@ use skein_peer::Call;
 use skein_peer::offload::MissionGeometry;
 use std::sync::Arc;
 
+/// A task is heard of so late at most, milliseconds: a ground station tells what it knows every
+/// two seconds, and a busy machine passes that on when it can.
+const TOLD_LATE_MS: u64 = 10_000;
+
 /// The world of one trial.
 #[derive(Debug)]
 pub struct LiveWorld {
@@ -25,7 +29,8 @@ impl LiveWorld {
     #[must_use]
     pub fn new(spec: &Spec, geometry: &MissionGeometry, seed: u64) -> Self {
         let site = Arc::new(Site::new(spec, Some(geometry)));
-        let world = World::on(site, spec, seed);
+        let mut world = World::on(site, spec, seed);
+        world.keep_looks(TOLD_LATE_MS);
         let mut links = LinkTable::new(world.nodes(), spec.radio);
         let faults = Overlay::default();
         links.compute(&world, &faults);
@@ -115,9 +120,10 @@ impl LiveWorld {
         self.world.end_laps()
     }
 
-    /// Somebody asks for a look.
-    pub fn ask(&mut self, look: AskedLook) {
+    /// Somebody asked for a look then, milliseconds, of which the trial hears now.
+    pub fn ask(&mut self, look: AskedLook, since_ms: u64) {
         self.world.ask(look.task, look.pieces, look.carriers);
+        self.world.look_back(look.task, since_ms);
     }
 
     /// The ground station calls services on the ground; gives those calls that are served.

@@ -496,7 +496,8 @@ impl<'a> Trial<'a> {
             self.account.asked(self.now_ms, asked);
             self.witnessed.asked(asked);
             if let Some(look) = AskedLook::of(&self.spec, &self.mission, asked) {
-                self.world.ask(look);
+                let since_ms = self.now_ms.saturating_sub(asked.age_ms);
+                self.world.ask(look, since_ms);
             }
         }
     }

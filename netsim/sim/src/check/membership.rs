@@ -221,12 +221,19 @@ impl Membership {
             let silent_ms = |id| snapshot.lived_ms(id, silence.since_ms);
             let knew = |m: &&PeerSnapshot| m.since_ms < silence.since_ms && m.id != subject;
             let overdue = |m: &&PeerSnapshot| silent_ms(m.id) > bound_ms;
+            // What is believed of a life that another process took over is believed of that one.
+            let twins = snapshot.peers.iter().filter(|p| p.id != subject);
+            let twins = twins.filter(|p| p.speaks_as == subject);
+            let goes_on = |life: u32| {
+                let mut lives = twins.clone().filter_map(|p| self.lives.get(&p.id));
+                lives.any(|(of, _)| *of == life)
+            };
             for m in snapshot.peers.iter().filter(knew).filter(overdue) {
-                let Some((_, status)) = self.beliefs.get(&(m.id, subject)) else {
+                let Some((life, status)) = self.beliefs.get(&(m.id, subject)) else {
                     continue;
                 };
                 let key = (m.id, subject);
-                if *status == Status::Down {
+                if *status == Status::Down || goes_on(*life) {
                     self.late.stop(key);
                     continue;
                 }
@@ -315,6 +322,7 @@ mod tests {
     use super::super::testing::{Story, speaking};
     use super::super::{Graph, Stability};
     use super::*;
+    use crate::twins::Twins;
     use skein_peer::cells::CellSet;
     use skein_peer::{Beliefs, PeerId};
 
@@ -409,6 +417,27 @@ mod tests {
                 found.counts.get("detect").copied().unwrap_or(0),
                 u64::from(!found_out)
             );
+        }
+    }
+
+    /// A process under the number of one that died goes on with its life, and is heard for it.
+    #[test]
+    fn a_death_is_not_missed_by_who_hears_another_process_in_that_life() {
+        for (twins_life, broken) in [(1, 0), (2, 1)] {
+            let (mut m, mut found, _) = two();
+            m.on_life(0, 9, twins_life);
+            let belief = (1, Status::Alive);
+            let judge = (&BOUNDS, &Handicaps::default());
+            m.on_belief(3_000, (1, 2), belief, judge, Some(0));
+            m.on_silent(50_000, 2, true, &BOUNDS);
+            let mut story = Story::new(300);
+            story.twins = Twins::from_iter([(9, 2)]);
+            let views = [(1, speaking()), (9, speaking())];
+            for at_ms in [70_000, 71_000] {
+                story.snapshot(at_ms, &views, |s| m.on_snapshot(s, &mut found));
+            }
+            let missed = found.counts.get("detect").copied().unwrap_or(0);
+            assert_eq!(missed, broken, "a twin in life {twins_life}");
         }
     }
 

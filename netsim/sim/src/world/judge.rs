@@ -219,6 +219,17 @@ impl Judge {
         self.tasks.ask(task, pieces, carriers);
     }
 
+    /// Tasks are heard of so late at most, milliseconds, from now on.
+    pub fn keep_looks(&mut self, keeps_ms: u64) {
+        self.tasks.keep_looks(keeps_ms);
+    }
+
+    /// A task was asked for then already, milliseconds: who saw it since counts, as far as looks
+    /// are kept.
+    pub fn look_back(&mut self, task: (u16, u32), since_ms: u64) {
+        self.tasks.look_back(task, since_ms);
+    }
+
     /// Who saw the last of a task and when, if all of it was seen since it was asked for.
     #[must_use]
     pub fn saw_task(&self, task: (u16, u32)) -> Option<Sighting> {

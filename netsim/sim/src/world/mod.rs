@@ -359,6 +359,16 @@ impl World {
         self.judge.ask(task, pieces, carriers);
     }
 
+    /// Tasks are heard of so late at most, milliseconds: what was seen meanwhile is kept.
+    pub fn keep_looks(&mut self, keeps_ms: u64) {
+        self.judge.keep_looks(keeps_ms);
+    }
+
+    /// A task that is heard of now was asked for then, milliseconds: who saw it since counts.
+    pub fn look_back(&mut self, task: (u16, u32), since_ms: u64) {
+        self.judge.look_back(task, since_ms);
+    }
+
     /// The computer with this number follows this revision of the mission: so does its UAV,
     /// if it commands it.
     pub fn follows(&mut self, number: u16, revision: u32) {

@@ -6,7 +6,7 @@ use super::camera::{Eye, Picture};
 use super::motion::Piece;
 use super::pieces::Pieces;
 use skein_geometry::frame::Point;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// A task that is to be seen.
 #[derive(Clone, Debug)]
@@ -19,12 +19,35 @@ struct Asked {
     last: Option<Sighting>,
 }
 
+impl Asked {
+    /// Takes in what one picture shows of it. Returns whether that was the last of it.
+    fn snap(&mut self, reach_m: f64, picture: &Picture, sighting: Sighting) -> bool {
+        if self.left == 0 || !self.carriers.contains(&sighting.uav) {
+            return false;
+        }
+        for i in self.pieces.near(picture.from(), reach_m) {
+            if !self.seen[i] && self.pieces.held(i, picture) {
+                self.seen[i] = true;
+                self.left -= 1;
+                self.last = Some(sighting);
+            }
+        }
+        self.left == 0
+    }
+}
+
+/// One picture: how far it reaches, what it shows, whose it is.
+type Look = (f64, Picture, Sighting);
+
 /// All tasks that were asked for, by number and revision.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TaskBoard {
     tasks: BTreeMap<(u16, u32), Asked>,
     /// How many are not seen yet.
     open: usize,
+    /// For how long pictures are kept, milliseconds, and those that are.
+    keeps_ms: u64,
+    kept: VecDeque<Look>,
 }
 
 impl TaskBoard {
@@ -49,6 +72,22 @@ impl TaskBoard {
         self.open += 1;
     }
 
+    /// Keeps pictures for so long from now on, for tasks that are heard of late.
+    pub(super) fn keep_looks(&mut self, keeps_ms: u64) {
+        self.keeps_ms = keeps_ms;
+    }
+
+    /// A task was asked for then already: what pictures that are kept showed of it since counts.
+    pub(super) fn look_back(&mut self, task: (u16, u32), since_ms: u64) {
+        let Some(asked) = self.tasks.get_mut(&task) else {
+            return;
+        };
+        let since = self.kept.iter().filter(|(.., s)| s.at_ms >= since_ms);
+        for (reach_m, picture, sighting) in since {
+            self.open -= usize::from(asked.snap(*reach_m, picture, *sighting));
+        }
+    }
+
     /// Who saw the last piece of a task and when, once all were seen.
     pub(super) fn saw(&self, task: (u16, u32)) -> Option<Sighting> {
         let asked = self.tasks.get(&task)?;
@@ -57,7 +96,7 @@ impl TaskBoard {
 
     /// Looks along a flown piece.
     pub(super) fn look(&mut self, uav: u16, eye: &Eye<'_>, piece: &Piece) {
-        if self.open == 0 {
+        if self.open == 0 && self.keeps_ms == 0 {
             return;
         }
         #[allow(
@@ -72,21 +111,17 @@ impl TaskBoard {
             let dt_s = span_ms as f64 / 1000.0 * f64::from(k) / f64::from(n);
             let at_ms = piece.from_ms + span_ms * u64::from(k) / u64::from(n);
             let picture = eye.picture(piece.pose_after(dt_s), at_ms);
-            self.snap(eye.reach_m(), &picture, Sighting { at_ms, uav });
-        }
-    }
-
-    fn snap(&mut self, reach_m: f64, picture: &Picture, sighting: Sighting) {
-        let open = self.tasks.values_mut().filter(|t| t.left > 0);
-        for task in open.filter(|t| t.carriers.contains(&sighting.uav)) {
-            for i in task.pieces.near(picture.from(), reach_m) {
-                if !task.seen[i] && task.pieces.held(i, picture) {
-                    task.seen[i] = true;
-                    task.left -= 1;
-                    task.last = Some(sighting);
-                }
+            let look = (eye.reach_m(), picture, Sighting { at_ms, uav });
+            for task in self.tasks.values_mut() {
+                self.open -= usize::from(task.snap(look.0, &look.1, look.2));
             }
-            self.open -= usize::from(task.left == 0);
+            if self.keeps_ms > 0 {
+                self.kept.push_back(look);
+            }
+        }
+        let from_ms = piece.to_ms.saturating_sub(self.keeps_ms);
+        while self.kept.front().is_some_and(|(.., s)| s.at_ms < from_ms) {
+            self.kept.pop_front();
         }
     }
 }
@@ -130,5 +165,29 @@ mod tests {
             "{seen:?}"
         );
         assert_eq!((board.saw((0, 2)), board.open), (None, 0));
+    }
+
+    #[test]
+    fn a_task_that_is_heard_of_late_was_seen_by_who_saw_it_since_it_was_asked_for() {
+        let corners = [(95.0, -5.0), (105.0, -5.0), (105.0, 5.0), (95.0, 5.0)];
+        let pieces = vec![corners.map(|(x, y)| Point::new(x, y))];
+        // All of the place is in the picture from 5.4 s to 9.2 s, and kept is what was since 5 s.
+        for (keeps_ms, since_ms, seen) in [
+            (5_000, 5_000, true),
+            (5_000, 9_500, false),
+            (400, 5_000, false),
+            (0, 5_000, false),
+        ] {
+            let mut board = TaskBoard::default();
+            board.keep_looks(keeps_ms);
+            flown(1, (0.0, 0.0), &mut board);
+            board.ask((0, 1), pieces.clone(), [1].into());
+            assert_eq!(board.saw((0, 1)), None);
+            board.look_back((0, 1), since_ms);
+            board.look_back((0, 1), since_ms);
+            let by = board.saw((0, 1)).map(|s| s.uav);
+            assert_eq!(by.is_some(), seen, "{keeps_ms} {since_ms} {by:?}");
+            assert_eq!(board.open, usize::from(!seen));
+        }
     }
 }
