@@ -25,6 +25,7 @@ use skein_geometry::frame::Point;
 use skein_peer::Mission;
 use skein_peer::gathering::CrowdAlert;
 use skein_peer::input::AskedTask;
+use skein_peer::wire::tasks::TaskState;
 use skein_peer::wire::trail::Trail;
 use skein_peer::witness::{Known, Looked};
 use std::collections::{BTreeMap, BTreeSet};
@@ -387,10 +388,12 @@ pub struct AskedLook {
 }
 
 impl AskedLook {
-    /// Of a task that somebody asks for; none of one that is over.
+    /// Of a task that somebody asks for, or that was done before anybody told of it; none of one
+    /// that is over without.
     #[must_use]
     pub fn of(spec: &Spec, mission: &Mission, asked: &AskedTask) -> Option<Self> {
-        asked.task.is_open().then(|| {
+        let is_wanted = matches!(asked.task.state, TaskState::Open | TaskState::Done);
+        is_wanted.then(|| {
             let needed = asked.task.sensor;
             let carriers = spec.uavs.iter().filter(|u| u.carries(needed));
             Self {

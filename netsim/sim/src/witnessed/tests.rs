@@ -6,6 +6,7 @@ use skein_geometry::frame::Vector;
 use skein_peer::count_site::{CountSite, Counted};
 use skein_peer::mission::mm;
 use skein_peer::wire::count::Count;
+use skein_peer::wire::tasks::{Task, TaskPlace};
 
 const STEP_MS: u64 = 50;
 const PERCEPT_MS: u64 = 200;
@@ -130,4 +131,33 @@ fn an_answer_that_does_not_come_holds_the_others_up_for_a_while_alone() {
     });
     assert_eq!(scene.witnessed.broken().len(), 1);
     assert!(scene.witnessed.waiting.len() < 15);
+}
+
+/// A trial hears every two seconds what is asked for: that may be done by then.
+#[test]
+fn a_task_that_was_done_before_anybody_told_of_it_is_to_have_been_seen() {
+    let spec = square(1);
+    let place = TaskPlace {
+        east_mm: 100_000,
+        north_mm: 100_000,
+    };
+    let of = |revision, state| {
+        let task = Task {
+            revision,
+            state,
+            places: vec![place],
+            ..Task::default()
+        };
+        let asked = AskedTask {
+            number: 3,
+            task,
+            age_ms: 0,
+        };
+        let look = AskedLook::of(&spec, &spec.mission, &asked)?;
+        Some((look.task, look.pieces.len(), look.carriers.len()))
+    };
+    assert_eq!(of(1, TaskState::Open), Some(((3, 1), 1, 1)));
+    assert_eq!(of(2, TaskState::Done), Some(((3, 1), 1, 1)));
+    assert_eq!(of(2, TaskState::Cancelled), None);
+    assert_eq!(of(2, TaskState::Expired), None);
 }

@@ -169,9 +169,10 @@ mod tests {
 
     #[test]
     fn a_task_that_is_heard_of_late_was_seen_by_who_saw_it_since_it_was_asked_for() {
-        let corners = [(95.0, -5.0), (105.0, -5.0), (105.0, 5.0), (95.0, 5.0)];
+        let corners = [(45.0, -5.0), (55.0, -5.0), (55.0, 5.0), (45.0, 5.0)];
         let pieces = vec![corners.map(|(x, y)| Point::new(x, y))];
-        // All of the place is in the picture from 5.4 s to 9.2 s, and kept is what was since 5 s.
+        // It is flown over after 3.8 s, and is in the picture for two seconds more; then 50 m of
+        // flight follow, until 10 s.
         for (keeps_ms, since_ms, seen) in [
             (5_000, 5_000, true),
             (5_000, 9_500, false),
