@@ -1,13 +1,12 @@
 //! Many simulated runs at the same time, one thread each.
 
+use crate::seeds;
 use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
 use skein_netsim::summary::{self, Summary};
 use skein_netsim::swarm::Outcome;
 use std::num::NonZeroUsize;
 use std::ops::Range;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// What a batch is to be.
@@ -27,45 +26,23 @@ pub fn run(prepared: &Prepared, batch: &Batch, failed: &(dyn Fn(&Outcome) + Sync
     let free_ms = batch
         .storm
         .then(|| runs::failure_free_makespan_ms(prepared));
-    let jobs = batch
-        .jobs
-        .or_else(|| std::thread::available_parallelism().ok())
-        .map_or(1, NonZeroUsize::get);
     let wanted = Wanted {
         events: false,
         baseline: true,
     };
     let started = Instant::now();
-    let next = AtomicU64::new(batch.seeds.start);
-    let outcomes = Mutex::new(Vec::new());
-    let work = || {
-        loop {
-            let seed = next.fetch_add(1, Ordering::Relaxed);
-            if seed >= batch.seeds.end {
-                return;
-            }
-            let outcome = match free_ms {
-                Some(free_ms) => runs::storm(prepared, seed, free_ms, wanted),
-                None => runs::planned(prepared, seed, wanted),
-            };
-            if !outcome.report.passed {
-                failed(&outcome);
-            }
-            // A thread that panicked would have ended the scope; the data is whole.
-            outcomes
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .push(outcome);
+    let run = |seed| {
+        let outcome = match free_ms {
+            Some(free_ms) => runs::storm(prepared, seed, free_ms, wanted),
+            None => runs::planned(prepared, seed, wanted),
+        };
+        if !outcome.report.passed {
+            failed(&outcome);
         }
+        outcome
     };
-    std::thread::scope(|scope| {
-        for _ in 0..jobs {
-            scope.spawn(work);
-        }
-    });
-    let outcomes = outcomes
-        .into_inner()
-        .unwrap_or_else(PoisonError::into_inner);
+    let add = |all: &mut Vec<Outcome>, _, outcome| all.push(outcome);
+    let outcomes = seeds::tally(batch.seeds.clone(), batch.jobs, Vec::new(), run, add);
     let mut total = summary::summarise(outcomes, started.elapsed().as_secs_f64());
     if batch.storm {
         total.judge_batch(&prepared.spec);
@@ -77,6 +54,7 @@ pub fn run(prepared: &Prepared, batch: &Batch, failed: &(dyn Fn(&Outcome) + Sync
 mod tests {
     use super::*;
     use skein_netsim::world::fixture;
+    use std::sync::atomic::{AtomicU64, Ordering};
 
     #[test]
     fn any_number_of_jobs_gives_the_same_figures() {

@@ -122,8 +122,8 @@ impl LiveWorld {
 
     /// Somebody asked for a look then, milliseconds, of which the trial hears now.
     pub fn ask(&mut self, look: AskedLook, since_ms: u64) {
-        self.world.ask(look.task, look.pieces, look.carriers);
-        self.world.look_back(look.task, since_ms);
+        self.world
+            .ask(look.task, look.pieces, look.carriers, since_ms);
     }
 
     /// The ground station calls services on the ground; gives those calls that are served.

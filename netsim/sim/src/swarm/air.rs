@@ -132,9 +132,15 @@ impl Air {
         self.world.revise(survey, geometry);
     }
 
-    /// A task is to be seen, by one of these; asked twice it is asked once.
-    pub fn ask(&mut self, task: (u16, u32), pieces: Vec<Corners>, carriers: BTreeSet<u16>) {
-        self.world.ask(task, pieces, carriers);
+    /// A task is to be seen since then, milliseconds, by one of these; asked twice it is asked once.
+    pub fn ask(
+        &mut self,
+        task: (u16, u32),
+        pieces: Vec<Corners>,
+        carriers: BTreeSet<u16>,
+        since_ms: u64,
+    ) {
+        self.world.ask(task, pieces, carriers, since_ms);
     }
 
     /// A UAV follows this revision of the mission.

@@ -95,7 +95,8 @@ impl Swarm {
             let pieces = self.operator.mission().pieces_of(&asked.task);
             let key = self.judged_as(*task, asked.task.revision_as_asked());
             let all = self.spec.uavs.iter().map(|u| u.id).collect();
-            self.air.ask(key, pieces.unwrap_or_default(), all);
+            let since_ms = self.now_ms.saturating_sub(asked.age_ms);
+            self.air.ask(key, pieces.unwrap_or_default(), all, since_ms);
         }
     }
 

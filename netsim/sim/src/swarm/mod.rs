@@ -934,8 +934,10 @@ impl Swarm {
             self.account.asked(self.now_ms, asked);
             self.checker.rules.relays.on_asked(asked);
             self.checker.rules.tracks.on_asked(asked);
-            if let Some(asked) = AskedLook::of(&self.spec, mission, asked) {
-                self.air.ask(asked.task, asked.pieces, asked.carriers);
+            if let Some(look) = AskedLook::of(&self.spec, mission, asked) {
+                let since_ms = self.now_ms.saturating_sub(asked.age_ms);
+                self.air
+                    .ask(look.task, look.pieces, look.carriers, since_ms);
             }
         }
         self.operator.note_tasks(self.now_ms, tasks);

@@ -213,21 +213,21 @@ impl Judge {
         self.tasks.look(uav, eye, piece);
     }
 
-    /// A task, by number and revision, is to be seen by one of these UAVs; asked twice it is
-    /// asked once.
-    pub fn ask(&mut self, task: (u16, u32), pieces: Vec<[Point; 4]>, carriers: BTreeSet<u16>) {
-        self.tasks.ask(task, pieces, carriers);
+    /// A task, by number and revision, is to be seen by one of these UAVs since then, milliseconds,
+    /// of what is past as far as looks are kept; asked twice it is asked once.
+    pub fn ask(
+        &mut self,
+        task: (u16, u32),
+        pieces: Vec<[Point; 4]>,
+        carriers: BTreeSet<u16>,
+        since_ms: u64,
+    ) {
+        self.tasks.ask(task, pieces, carriers, since_ms);
     }
 
     /// Tasks are heard of so late at most, milliseconds, from now on.
     pub fn keep_looks(&mut self, keeps_ms: u64) {
         self.tasks.keep_looks(keeps_ms);
-    }
-
-    /// A task was asked for then already, milliseconds: who saw it since counts, as far as looks
-    /// are kept.
-    pub fn look_back(&mut self, task: (u16, u32), since_ms: u64) {
-        self.tasks.look_back(task, since_ms);
     }
 
     /// Who saw the last of a task and when, if all of it was seen since it was asked for.

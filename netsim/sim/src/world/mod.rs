@@ -354,19 +354,21 @@ impl World {
         );
     }
 
-    /// A task is to be seen, by one of these UAVs; asked twice it is asked once.
-    pub fn ask(&mut self, task: (u16, u32), pieces: Vec<Corners>, carriers: BTreeSet<u16>) {
-        self.judge.ask(task, pieces, carriers);
+    /// A task is to be seen since then, milliseconds, by one of these UAVs; asked twice it is
+    /// asked once.
+    pub fn ask(
+        &mut self,
+        task: (u16, u32),
+        pieces: Vec<Corners>,
+        carriers: BTreeSet<u16>,
+        since_ms: u64,
+    ) {
+        self.judge.ask(task, pieces, carriers, since_ms);
     }
 
     /// Tasks are heard of so late at most, milliseconds: what was seen meanwhile is kept.
     pub fn keep_looks(&mut self, keeps_ms: u64) {
         self.judge.keep_looks(keeps_ms);
-    }
-
-    /// A task that is heard of now was asked for then, milliseconds: who saw it since counts.
-    pub fn look_back(&mut self, task: (u16, u32), since_ms: u64) {
-        self.judge.look_back(task, since_ms);
     }
 
     /// The computer with this number follows this revision of the mission: so does its UAV,

@@ -51,41 +51,36 @@ pub(super) struct TaskBoard {
 }
 
 impl TaskBoard {
-    /// One more; asked twice it is asked once.
+    /// One more, which was asked for then: what pictures that are kept showed of it since counts.
+    /// Asked twice it is asked once.
     pub(super) fn ask(
         &mut self,
         task: (u16, u32),
         pieces: Vec<[Point; 4]>,
         carriers: BTreeSet<u16>,
+        since_ms: u64,
     ) {
         if pieces.is_empty() || self.tasks.contains_key(&task) {
             return;
         }
-        let asked = Asked {
+        let mut asked = Asked {
             seen: vec![false; pieces.len()],
             left: pieces.len(),
             pieces: Pieces::new(pieces),
             carriers,
             last: None,
         };
+        let since = self.kept.iter().filter(|(.., s)| s.at_ms >= since_ms);
+        for (reach_m, picture, sighting) in since {
+            asked.snap(*reach_m, picture, *sighting);
+        }
+        self.open += usize::from(asked.left > 0);
         self.tasks.insert(task, asked);
-        self.open += 1;
     }
 
     /// Keeps pictures for so long from now on, for tasks that are heard of late.
     pub(super) fn keep_looks(&mut self, keeps_ms: u64) {
         self.keeps_ms = keeps_ms;
-    }
-
-    /// A task was asked for then already: what pictures that are kept showed of it since counts.
-    pub(super) fn look_back(&mut self, task: (u16, u32), since_ms: u64) {
-        let Some(asked) = self.tasks.get_mut(&task) else {
-            return;
-        };
-        let since = self.kept.iter().filter(|(.., s)| s.at_ms >= since_ms);
-        for (reach_m, picture, sighting) in since {
-            self.open -= usize::from(asked.snap(*reach_m, picture, *sighting));
-        }
     }
 
     /// Who saw the last piece of a task and when, once all were seen.
@@ -151,8 +146,8 @@ mod tests {
             [(-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)].map(|(a, b)| Point::new(x + a, b))
         };
         let mut board = TaskBoard::default();
-        board.ask((0, 1), vec![square(60.0), square(200.0)], [1].into());
-        board.ask((0, 1), vec![square(0.0)], [1].into());
+        board.ask((0, 1), vec![square(60.0), square(200.0)], [1].into(), 0);
+        board.ask((0, 1), vec![square(0.0)], [1].into(), 0);
         flown(2, (0.0, 0.0), &mut board);
         flown(2, (100.0, 0.0), &mut board);
         assert_eq!(board.saw((0, 1)), None, "it carries nothing of use");
@@ -182,10 +177,9 @@ mod tests {
             let mut board = TaskBoard::default();
             board.keep_looks(keeps_ms);
             flown(1, (0.0, 0.0), &mut board);
-            board.ask((0, 1), pieces.clone(), [1].into());
             assert_eq!(board.saw((0, 1)), None);
-            board.look_back((0, 1), since_ms);
-            board.look_back((0, 1), since_ms);
+            board.ask((0, 1), pieces.clone(), [1].into(), since_ms);
+            board.ask((0, 1), pieces.clone(), [1].into(), since_ms);
             let by = board.saw((0, 1)).map(|s| s.uav);
             assert_eq!(by.is_some(), seen, "{keeps_ms} {since_ms} {by:?}");
             assert_eq!(board.open, usize::from(!seen));

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::buildings::{Building, Buildings};
+use crate::mission::mm;
 use crate::testing::mission;
 use skein_flight::tracking::estimate::Detection;
 use skein_flight::tracking::tracks::{Kind, Sighting};
@@ -66,7 +67,6 @@ impl Scene {
             });
             let seen: Vec<Sighting> = seen.collect();
             self.tracks.look(self.now_ms, &seen, &in_view);
-            let mm = |m: f64| (m * 1000.0).round() as i32;
             let sighted = seen.iter().map(|s| Sighted {
                 east_mm: mm(s.detection.at.x),
                 north_mm: mm(s.detection.at.y),

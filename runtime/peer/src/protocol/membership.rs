@@ -643,7 +643,7 @@ impl Membership {
         if known.is_some_and(|known| known.is_refuted_by(&heard)) {
             self.note_apart(now);
         }
-        let floods = self.is_far(now);
+        let is_far = self.is_far(now);
         let Some(known) = self.known.get_mut(&heard.id) else {
             if !self.make_room(now) {
                 return false;
@@ -679,7 +679,7 @@ impl Membership {
         let verdict_ms = limits.verdict_ms(ms_of(known.freshest.interval, self.period_ms));
         let was_asked =
             known.status != Status::Down && urgency(&known.freshest, &limits, verdict_ms, now) > 0;
-        let passes_on = floods && was_asked && heard.suspected.is_none() && !new_life;
+        let passes_on = is_far && was_asked && heard.suspected.is_none() && !new_life;
         let before = known.freshest;
         if passes_on && heard.hops > 1 {
             // What was asked for comes by whatever way is quick: nobody is farther for it.
