@@ -42,7 +42,7 @@ use skein_flight::separation::{End, MotionPlan, Stretch as Promised};
 use skein_geometry::frame::Pose;
 use skein_geometry::math::TAU;
 use skein_geometry::{Curve, Segment};
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// How far ahead a flight is promised, seconds: two of them that may meet within it, and the
 /// circle at its end, are nearly always in each other's earshot.
@@ -79,6 +79,8 @@ pub(super) struct Contingency {
     rest: Vec<Move>,
     /// The circle in which that ends.
     rest_arrives: Option<f64>,
+    /// Cells of the goal that it cannot reach from where it looked lately, and since when.
+    unreached: BTreeMap<u16, u64>,
     /// Where it stands ready to be launched, and no flight from there is agreed.
     stands: Option<Pose>,
     /// No way from there was clear when it was looked for last.
@@ -97,6 +99,7 @@ impl Contingency {
             goals: 0,
             rest: Vec::new(),
             rest_arrives: None,
+            unreached: BTreeMap::new(),
             stands: None,
             held_up: false,
         }

@@ -84,3 +84,12 @@ fn who_take_off_at_one_place_by_agreement_take_hardly_longer() {
         "{agreed_s} s instead of {slots_s} s"
     );
 }
+
+/// Two with nothing to do circled beside each other, and the last cell behind them took six
+/// minutes.
+#[test]
+fn who_has_nothing_to_do_makes_room_for_who_flies_the_last_cell() {
+    let begin = "launch: \"base\", takeoff_interval_s: 5";
+    let seen_s = seen_s(begin, "separation_m: 30,", 48);
+    assert!(seen_s < 330.0, "{seen_s} s");
+}

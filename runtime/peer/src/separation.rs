@@ -10,13 +10,13 @@
 //! | it stands ready to be launched | nothing is in force; its first flight is asked for, where none is clear for long by pleading |
 //! | what was offered is agreed | it is flown |
 //! | the goal does not lead where the offer does | the offer is withdrawn |
-//! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after a second |
+//! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after a second, and where none does for long, one is offered to show who is in the way |
 //! | one who goes before is held up by this UAV, which gets no further itself, or anybody by one with nothing to do | a way aside is offered that lets them pass |
 //! | another UAV is believed down, for so long that it would have circled, and not sensed where it promised to be | what it promised is in nobody's way |
 //! | one who says nothing is sensed, and does not circle | nothing near it is agreed (`silence`) |
 //! | another mission, other zones | what is in force stays; what is on offer is withdrawn |
 
-mod line;
+mod held_up;
 mod passing;
 mod silence;
 
@@ -27,7 +27,7 @@ use crate::protocol::promises::Brief;
 use crate::wire::codec::Body;
 use crate::wire::message::{Member, Record};
 use crate::{Incarnation, PeerId};
-use line::Line;
+use held_up::HeldUp;
 use passing::{Gist, Passing};
 use silence::{Silence, ends_ms};
 use skein_behaviors::executive::promised::{CIRCLE_RADII, Extension, PROMISED_MOST_S};
@@ -102,7 +102,7 @@ pub(crate) struct Separation {
     /// Since when others are believed down.
     down_since: BTreeMap<u16, Time>,
     passing: Passing,
-    line: Line,
+    held_up: HeldUp,
     silence: Silence,
     /// When others were heard last, milliseconds of the common clock.
     heard_ms: BTreeMap<u16, u64>,
@@ -127,7 +127,7 @@ impl Separation {
             lives: BTreeMap::new(),
             down_since: BTreeMap::new(),
             passing: Passing::default(),
-            line: Line::default(),
+            held_up: HeldUp::default(),
             silence: Silence::default(),
             heard_ms: BTreeMap::new(),
         }
@@ -332,22 +332,21 @@ impl Separation {
             let mut ways = executive.extensions(now_ms, lead_ms, is_open);
             let offers = || ways.iter().map(|e| (&e.plan, until(e)));
             let clear = conflicts.offer(now_ms, offers(), None);
-            let nth = if executive.stands() {
-                let nth = match clear {
-                    None if self.line.is_due(now_ms) => conflicts.plead(now_ms, offers()),
-                    clear => clear,
-                };
-                self.line.looked(now_ms, clear.is_some(), nth.is_some());
-                executive.is_held_up(nth.is_none());
-                nth
-            } else {
-                clear
+            let nth = match clear {
+                None if self.held_up.is_due(now_ms) => conflicts.plead(now_ms, offers()),
+                clear => clear,
             };
+            self.held_up.looked(now_ms, clear.is_some(), nth.is_some());
+            if executive.stands() {
+                executive.is_held_up(nth.is_none());
+            }
             if let Some(nth) = nth {
                 self.offered = Some(ways.swap_remove(nth));
                 self.is_news = true;
                 return;
             }
+        } else {
+            self.held_up = HeldUp::default();
         }
         self.search_from_ms = now_ms + again_ms;
         let of = if wants {

@@ -11,7 +11,7 @@ use crate::reactive::follow::Track;
 use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::{TAU, sin_cos};
 use skein_geometry::{Curve, Segment};
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 /// Ways off the loop are promised in parts of this length, metres: at the end of each it may
 /// wait.
@@ -35,20 +35,26 @@ const ASIDE_COURSES: u32 = 8;
 
 impl Executive {
     /// Flights that could follow on what is in force, turning off at least `lead_ms` after a
-    /// time, the best first. Cells that cannot be reached are given up.
+    /// time, the best first. Cells that cannot be reached from anywhere on its circle are given
+    /// up: where a circle has room there need be none for a turn off every place of it.
     pub fn extensions(
         &mut self,
         at_ms: u64,
         lead_ms: u64,
         is_open: &dyn Fn(u16) -> bool,
     ) -> Vec<Extension> {
-        let mut events = Vec::new();
-        let ways: Vec<Way> = self
-            .cuts(at_ms, lead_ms)
-            .into_iter()
-            .map(|(cut_m, cut)| self.way(cut_m, cut, is_open, &mut events))
-            .collect();
-        self.pending.extend(events);
+        let mut ways = Vec::new();
+        let mut from_all: Option<Unreached> = None;
+        for (cut_m, cut) in self.cuts(at_ms, lead_ms) {
+            let mut events = Vec::new();
+            ways.push(self.way(cut_m, cut, is_open, &mut events));
+            let here = Unreached::of(&events);
+            from_all = Some(match from_all {
+                None => here,
+                Some(before) => before.and(&here),
+            });
+        }
+        self.refuse(at_ms, &from_all.unwrap_or_default());
         let mut ways: Vec<Way> = ways.into_iter().filter(|w| !w.moves.is_empty()).collect();
         ways.sort_by(|a, b| (a.cut_m + a.idle_m).total_cmp(&(b.cut_m + b.idle_m)));
         // Who stands takes off then.
@@ -56,6 +62,32 @@ impl Executive {
             .launches_in_ms()
             .map_or(0, |least_ms| least_ms.max(lead_ms + ROLL_MS));
         self.offer(&ways, at_ms + waits_ms)
+    }
+
+    /// Tells of what cannot be reached: of a cell once that was so wherever it looked for a
+    /// whole circle, of one who stands at once.
+    fn refuse(&mut self, at_ms: u64, unreached: &Unreached) {
+        let circle_s = TAU * self.circle_radius_m() / self.speed_mps();
+        let stands = self.stands();
+        let Some(c) = &mut self.contingency else {
+            return;
+        };
+        let before = core::mem::take(&mut c.unreached);
+        let mut cells = Vec::new();
+        for cell in &unreached.cells {
+            let since_ms = before.get(cell).copied().unwrap_or(at_ms);
+            if stands || at_ms >= since_ms + whole_ms(circle_s) {
+                cells.push(*cell);
+            } else {
+                c.unreached.insert(*cell, since_ms);
+            }
+        }
+        if !cells.is_empty() {
+            self.pending.push(Event::Refused { cells });
+        }
+        if unreached.point {
+            self.pending.push(Event::Refused { cells: Vec::new() });
+        }
     }
 
     /// Ways out of another UAV's way, the shortest first.
@@ -352,6 +384,35 @@ impl Executive {
                 curve.push(*piece);
                 curve
             }
+        }
+    }
+}
+
+/// What cannot be reached from a place.
+#[derive(Default)]
+struct Unreached {
+    cells: BTreeSet<u16>,
+    /// The point that the goal asks for.
+    point: bool,
+}
+
+impl Unreached {
+    fn of(events: &[Event]) -> Self {
+        let mut unreached = Self::default();
+        for event in events {
+            if let Event::Refused { cells } = event {
+                unreached.point |= cells.is_empty();
+                unreached.cells.extend(cells);
+            }
+        }
+        unreached
+    }
+
+    /// What cannot be reached from another place either.
+    fn and(&self, other: &Self) -> Self {
+        Self {
+            cells: &self.cells & &other.cells,
+            point: self.point && other.point,
         }
     }
 }

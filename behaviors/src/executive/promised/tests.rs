@@ -22,6 +22,9 @@ struct Flight {
     in_force: Option<Motion>,
     imposed: u32,
     done: bool,
+    may_give_up: bool,
+    /// Cells that were given up, and when.
+    given_up: Vec<(u16, u64)>,
 }
 
 impl Flight {
@@ -47,6 +50,8 @@ impl Flight {
             in_force: None,
             imposed: 0,
             done: false,
+            may_give_up: false,
+            given_up: Vec::new(),
         };
         flight.legs(0, n);
         flight
@@ -93,10 +98,17 @@ impl Flight {
                 | Event::CutShort { .. }
                 | Event::Sighted { .. }
                 | Event::DetourFlown => {}
-                Event::Refused { cells } => panic!("refused {cells:?}"),
+                Event::Refused { cells } if !self.may_give_up => panic!("refused {cells:?}"),
+                Event::Refused { cells } => {
+                    let at_ms = percept.time_ms;
+                    self.given_up.extend(cells.into_iter().map(|c| (c, at_ms)));
+                }
             }
         }
         self.done = !self.open.contains(&true);
+        for (cell, _) in &self.given_up {
+            self.open[usize::from(*cell)] = false;
+        }
         let now_ms = percept.time_ms;
         if self.executive.take_imposed() {
             self.imposed += 1;
@@ -194,6 +206,53 @@ fn a_cell_whose_way_is_longer_than_a_promise_is_flown_in_parts() {
     assert!(
         asks_ms < free_ms + 30_000,
         "{asks_ms} ms instead of {free_ms} ms"
+    );
+}
+
+/// From places of a circle beside a zone no way leads on.
+#[test]
+fn who_has_to_circle_anywhere_gives_no_cell_up() {
+    let zones = vec![
+        rectangle(100.0, 100.0, 20.0, 20.0),
+        rectangle(200.0, 60.0, 20.0, 200.0),
+        rectangle(320.0, 100.0, 60.0, 60.0),
+    ];
+    for silent_s in [19, 23, 27, 31] {
+        let mut flight = Flight::around(true, (10, 8), zones.clone());
+        while !flight.done && flight.wing.time_ms < 3_000_000 {
+            flight.answer_ms = 400;
+            flight.asked = None;
+            flight.fly(24);
+            flight.answer_ms = u64::MAX / 2;
+            flight.fly(silent_s);
+        }
+        assert!(flight.done, "{silent_s} s without an answer");
+    }
+}
+
+#[test]
+fn what_no_place_of_a_circle_leads_to_is_given_up_after_one() {
+    let mut flight = Flight::new(true);
+    // The loop leads through a zone of which the mission knew nothing.
+    let (coverage_loop, _) = loop_and_router(6, 4, Vec::new());
+    let within = coverage_loop
+        .curve(9, Forward)
+        .pose_at(10.0)
+        .unwrap()
+        .position();
+    let zone = rectangle(within.x - 5.0, within.y - 5.0, 10.0, 10.0);
+    let (_, router) = loop_and_router(6, 4, vec![zone]);
+    flight.executive = Executive::new(airframe(), 90.0, coverage_loop, router).with_promises();
+    flight.may_give_up = true;
+    flight.legs(9, 1);
+    flight.fly(60);
+    let circle_s = TAU * flight.executive.circle_radius_m() / flight.executive.speed_mps();
+    let [(9, at_ms)] = flight.given_up[..] else {
+        panic!("{:?}", flight.given_up);
+    };
+    assert!(
+        (circle_s..circle_s + 12.0).contains(&(at_ms as f64 / 1e3)),
+        "{at_ms} ms"
     );
 }
 

@@ -10,7 +10,7 @@
 //! | idle | a wish, and a way that is clear | proposing | the proposal is said |
 //! | idle | a wish, and no such way | idle | the search is repeated after a second |
 //! | proposing | agreed before the branch | on its way | the way is flown |
-//! | proposing | the branch is passed | idle | the next branch is put off half as far again |
+//! | proposing | the branch is passed | idle | the next branch is put off half as far again, unless it pleaded |
 //! | proposing | gave way | idle | another way is looked for at once |
 //! | on its way | every 5 s: a way that costs a second less | proposing | the proposal is said |
 //!
@@ -407,8 +407,11 @@ impl Conflicts {
     pub fn tick(&mut self, now_ms: u64) -> bool {
         self.promises.forget(|m| m.has_left(now_ms));
         let mut news = self.settle(now_ms).news;
+        let pleaded = self.promises.pleads();
         if now_ms > self.branch_ms && self.promises.withdraw() {
-            self.lead_ms = (self.lead_ms * 3 / 2).min(LEAD_MOST_MS);
+            if !pleaded {
+                self.lead_ms = (self.lead_ms * 3 / 2).min(LEAD_MOST_MS);
+            }
             self.search_from_ms = now_ms;
             news = true;
         }
@@ -695,6 +698,24 @@ mod tests {
         assert!(g.in_force().has_left(9_600), "and is not agreed");
         let _ = g.tick(11_500);
         assert!(!g.is_proposing());
+        assert_eq!(g.lead_ms(), LEAD_FIRST_MS, "answers were not late");
+    }
+
+    #[test]
+    fn what_pleads_with_who_is_silent_is_not_flown() {
+        let mut a = uav(1, -100, 0, Point::new(600.0, 0.0));
+        a.wish(None);
+        let (mut g, plan) = on_ground(3, 0, 12_000);
+        g.sensed([(PeerId(1), Point::new(0.0, 0.0))].into_iter(), 9_200);
+        let _ = g.hear(PeerId(1), &a.intent(), 9_200);
+        // It circles where it promised to, and nobody asks it.
+        g.are_silent(Silent {
+            all: [PeerId(1)].into(),
+            elsewhere: BTreeMap::new(),
+        });
+        assert_eq!(g.plead(9_200, [(&plan, 11_400)]), Some(0));
+        let _ = g.tick(9_400);
+        assert!(g.is_proposing() && g.in_force().has_left(9_400));
     }
 
     #[test]

@@ -343,6 +343,12 @@ impl<M: Clone> Promises<M> {
         self.pleads = true;
     }
 
+    /// Whether what is proposed shows others what they hold up.
+    #[must_use]
+    pub fn pleads(&self) -> bool {
+        self.pleads && self.proposal.is_some()
+    }
+
     /// Withdraws the own proposal, if there is one; says whether.
     pub fn withdraw(&mut self) -> bool {
         let had = self.proposal.take().is_some();
@@ -360,15 +366,15 @@ impl<M: Clone> Promises<M> {
         apart: &dyn Fn(&M, &M) -> bool,
     ) -> Settled {
         let mut settled = Settled::default();
-        if let Some(own) = &self.proposal
-            && !self.pleads
-            && !self.is_clear(&own.motion, apart)
-        {
+        let proposal = self.proposal.as_ref();
+        let is_clear = proposal.is_none_or(|own| self.is_clear(&own.motion, apart));
+        if !is_clear && !self.pleads {
             self.proposal = None;
             settled.gave_way = true;
         }
         let accepted = self.accept(apart);
-        if may_adopt && self.is_agreed(is_asked) {
+        // Who is not asked accepts nothing, and need not have made room for what pleads.
+        if may_adopt && is_clear && self.is_agreed(is_asked) {
             if let Some(own) = self.proposal.take() {
                 self.in_force = own;
             }

@@ -32,8 +32,8 @@ const CIRCLES_MS: u64 = 5_000;
 const STAYS_MS: u64 = 15_000;
 
 /// The one with the higher number waits longer by this, milliseconds: what the other has agreed
-/// begins meanwhile, and is seen.
-const AFTER_MS: u64 = 4_000;
+/// begins meanwhile, nine seconds later where its last offers were not answered, and is seen.
+const AFTER_MS: u64 = 12_000;
 
 /// Who was not sensed for so long is looked at anew, milliseconds.
 const LOST_MS: u64 = 1_000;
@@ -240,12 +240,12 @@ mod tests {
         // It gets there after ten seconds.
         let said = motion(0.0, 120);
         assert_eq!(counts_from(9, &said, &said, Some(0)), Some((15_000, true)));
-        assert_eq!(counts_from(2, &said, &said, Some(0)), Some((19_000, true)));
+        assert_eq!(counts_from(2, &said, &said, Some(0)), Some((27_000, true)));
         // Who flies sees the other circle; who began to circle later waits from then on.
         assert_eq!(counts_from(2, &said, &said, None), Some((15_000, true)));
         assert_eq!(
             counts_from(2, &said, &said, Some(13_000)),
-            Some((22_000, true))
+            Some((30_000, true))
         );
     }
 
@@ -261,6 +261,6 @@ mod tests {
         let (at_ms, as_promised) = counts_from(9, &said, &flown, Some(0)).unwrap();
         assert!((15_000..17_000).contains(&at_ms) && !as_promised, "{at_ms}");
         let (later_ms, _) = counts_from(2, &said, &flown, Some(0)).unwrap();
-        assert_eq!(later_ms, at_ms + 4_000);
+        assert_eq!(later_ms, at_ms + AFTER_MS);
     }
 }
