@@ -680,14 +680,19 @@ mod tests {
         assert!(a.seen.contains_key(&PeerId(3)) && a.flown_by(PeerId(3)).is_some());
     }
 
-    #[test]
-    fn who_pleads_is_made_room_for() {
-        // It circles where another one wants to take off, with nothing to do.
+    /// One circles, with nothing to do, where another one wants to take off; and the take-off.
+    fn in_the_way() -> (Conflicts, Conflicts, MotionPlan) {
         let mut a = uav(1, -100, 0, Point::new(600.0, 0.0));
         a.wish(None);
         let (mut g, plan) = on_ground(3, 0, 12_000);
         g.sensed([(PeerId(1), Point::new(0.0, 0.0))].into_iter(), 9_200);
         let _ = g.hear(PeerId(1), &a.intent(), 9_200);
+        (a, g, plan)
+    }
+
+    #[test]
+    fn who_pleads_is_made_room_for() {
+        let (mut a, mut g, plan) = in_the_way();
         assert_eq!(g.offer(9_200, [(&plan, 11_400)], None), None);
         assert!(!a.is_in_the_way(9_200, InTheWay::OfAnybody));
         assert_eq!(g.plead(9_200, [(&plan, 11_400)]), Some(0));
@@ -703,11 +708,7 @@ mod tests {
 
     #[test]
     fn what_pleads_with_who_is_silent_is_not_flown() {
-        let mut a = uav(1, -100, 0, Point::new(600.0, 0.0));
-        a.wish(None);
-        let (mut g, plan) = on_ground(3, 0, 12_000);
-        g.sensed([(PeerId(1), Point::new(0.0, 0.0))].into_iter(), 9_200);
-        let _ = g.hear(PeerId(1), &a.intent(), 9_200);
+        let (_, mut g, plan) = in_the_way();
         // It circles where it promised to, and nobody asks it.
         g.are_silent(Silent {
             all: [PeerId(1)].into(),
