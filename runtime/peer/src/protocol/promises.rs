@@ -366,15 +366,18 @@ impl<M: Clone> Promises<M> {
         apart: &dyn Fn(&M, &M) -> bool,
     ) -> Settled {
         let mut settled = Settled::default();
-        let proposal = self.proposal.as_ref();
-        let is_clear = proposal.is_none_or(|own| self.is_clear(&own.motion, apart));
-        if !is_clear && !self.pleads {
+        let is_clear = |promises: &Self| {
+            let proposal = promises.proposal.as_ref();
+            proposal.is_none_or(|own| promises.is_clear(&own.motion, apart))
+        };
+        if !self.pleads && !is_clear(self) {
             self.proposal = None;
             settled.gave_way = true;
         }
         let accepted = self.accept(apart);
         // Who is not asked accepts nothing, and need not have made room for what pleads.
-        if may_adopt && is_clear && self.is_agreed(is_asked) {
+        let may_adopt = may_adopt && (!self.pleads || is_clear(self));
+        if may_adopt && self.is_agreed(is_asked) {
             if let Some(own) = self.proposal.take() {
                 self.in_force = own;
             }
@@ -400,7 +403,9 @@ impl<M: Clone> Promises<M> {
 
     /// Accepts the proposals of others that keep apart from all that this UAV may fly.
     fn accept(&mut self, apart: &dyn Fn(&M, &M) -> bool) -> bool {
-        let own = self.proposal.as_ref().map(|p| &p.motion);
+        // What pleads is in nobody's way: it is flown only once it is clear of what was accepted.
+        let own = self.proposal.as_ref().filter(|_| !self.pleads);
+        let own = own.map(|p| &p.motion);
         let mut news = false;
         for other in self.others.values_mut() {
             let clear = |theirs: &&Promise<M>| {
