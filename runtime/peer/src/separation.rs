@@ -10,7 +10,7 @@
 //! | it stands ready to be launched | nothing is in force; its first flight is asked for, where none is clear for long by pleading |
 //! | what was offered is agreed | it is flown |
 //! | the goal does not lead where the offer does | the offer is withdrawn |
-//! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after a second, and where none does for long, one is offered to show who is in the way |
+//! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after a second, and where none does for long, and who is in the way circles, one is offered to show it |
 //! | one who goes before is held up by this UAV, which gets no further itself, or anybody by one with nothing to do | a way aside is offered that lets them pass |
 //! | another UAV is believed down, for so long that it would have circled, and not sensed where it promised to be | what it promised is in nobody's way |
 //! | one who says nothing is sensed, and does not circle | nothing near it is agreed (`silence`) |
@@ -47,6 +47,10 @@ const SEARCH_AGAIN_MS: u64 = 1_000;
 /// take-off half as far ahead as for a turn in flight: what comes of no answer in time is another
 /// second on the ground, not a circle.
 const STANDING_AGAIN_MS: u64 = 400;
+
+/// Who has circled for so long has nothing to do, most likely, milliseconds: others find a way
+/// sooner.
+const NOTHING_TO_DO_MS: u64 = 10_000;
 
 /// What waits for an answer is said again after so long, milliseconds.
 const SAY_AGAIN_MS: u64 = 900;
@@ -332,8 +336,13 @@ impl Separation {
             let mut ways = executive.extensions(now_ms, lead_ms, is_open);
             let offers = || ways.iter().map(|e| (&e.plan, until(e)));
             let clear = conflicts.offer(now_ms, offers(), None);
+            let since_ms = now_ms.saturating_sub(NOTHING_TO_DO_MS);
+            let pleads = executive.stands()
+                || ways
+                    .first()
+                    .is_some_and(|e| conflicts.meets_who_circles(&e.plan, now_ms, since_ms));
             let nth = match clear {
-                None if self.held_up.is_due(now_ms) => conflicts.plead(now_ms, offers()),
+                None if pleads && self.held_up.is_due(now_ms) => conflicts.plead(now_ms, offers()),
                 clear => clear,
             };
             self.held_up.looked(now_ms, clear.is_some(), nth.is_some());

@@ -357,6 +357,21 @@ impl Conflicts {
         Some(nth)
     }
 
+    /// Whether a motion is in the way of somebody who has circled since a time: most likely it
+    /// has nothing to do.
+    #[must_use]
+    pub fn meets_who_circles(&self, plan: &MotionPlan, now_ms: u64, since_ms: u64) -> bool {
+        let Ok(motion) = Motion::new(plan.clone()) else {
+            return false;
+        };
+        let apart = self.apart.since(now_ms);
+        self.seen.keys().any(|id| {
+            let flown = self.promises.flown_by(*id);
+            let circles = flown.filter(|m| m.ends_at_s() <= seconds(since_ms));
+            circles.is_some_and(|m| !apart(&motion, m))
+        })
+    }
+
     /// Whether what others propose is held up by what is flown here, and by nothing else
     /// that this UAV says.
     #[must_use]
@@ -695,6 +710,9 @@ mod tests {
         let (mut a, mut g, plan) = in_the_way();
         assert_eq!(g.offer(9_200, [(&plan, 11_400)], None), None);
         assert!(!a.is_in_the_way(9_200, InTheWay::OfAnybody));
+        let ends_ms = (a.in_force().ends_at_s() * 1e3).ceil() as u64;
+        assert!(g.meets_who_circles(&plan, 9_200, ends_ms));
+        assert!(ends_ms == 0 || !g.meets_who_circles(&plan, 9_200, ends_ms - 1));
         assert_eq!(g.plead(9_200, [(&plan, 11_400)]), Some(0));
         assert!(!g.tick(9_400) && g.is_proposing(), "it stays on offer");
         let _ = a.hear(PeerId(3), &g.intent(), 9_500);
