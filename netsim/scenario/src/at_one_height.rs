@@ -3,6 +3,9 @@
 use skein_netsim::Prepared;
 use skein_netsim::runs::{Wanted, failure_free_makespan_ms, faults_of, run};
 
+/// One after the other, as far apart as they need.
+const FROM_ONE_PLACE: &str = "launch: \"base\", takeoff_interval_s: 5";
+
 /// The default mission without faults of its own, of eight that begin like this, on a radio of
 /// so many bits a second.
 fn mission(begin: &str, fleet: &str, rate_bps: u32) -> Prepared {
@@ -77,8 +80,7 @@ fn who_fly_at_one_height_keep_apart_and_take_hardly_longer() {
 
 #[test]
 fn who_take_off_at_one_place_by_agreement_take_hardly_longer() {
-    let begin = "launch: \"base\", takeoff_interval_s: 5";
-    let (agreed_s, slots_s) = both_s(begin, 41..46);
+    let (agreed_s, slots_s) = both_s(FROM_ONE_PLACE, 41..46);
     assert!(
         agreed_s < 1.12 * slots_s,
         "{agreed_s} s instead of {slots_s} s"
@@ -89,7 +91,6 @@ fn who_take_off_at_one_place_by_agreement_take_hardly_longer() {
 /// minutes.
 #[test]
 fn who_has_nothing_to_do_makes_room_for_who_flies_the_last_cell() {
-    let begin = "launch: \"base\", takeoff_interval_s: 5";
-    let seen_s = seen_s(begin, "separation_m: 30,", 48);
+    let seen_s = seen_s(FROM_ONE_PLACE, "separation_m: 30,", 48);
     assert!(seen_s < 330.0, "{seen_s} s");
 }

@@ -337,13 +337,14 @@ impl Separation {
             let offers = || ways.iter().map(|e| (&e.plan, until(e)));
             let clear = conflicts.offer(now_ms, offers(), None);
             let since_ms = now_ms.saturating_sub(NOTHING_TO_DO_MS);
-            let pleads = executive.stands()
-                || ways
-                    .first()
-                    .is_some_and(|e| conflicts.meets_who_circles(&e.plan, now_ms, since_ms));
-            let nth = match clear {
-                None if pleads && self.held_up.is_due(now_ms) => conflicts.plead(now_ms, offers()),
-                clear => clear,
+            let meets = |e: &Extension| conflicts.meets_who_circles(&e.plan, now_ms, since_ms);
+            let pleads = clear.is_none()
+                && self.held_up.is_due(now_ms)
+                && (executive.stands() || ways.first().is_some_and(meets));
+            let nth = if pleads {
+                conflicts.plead(now_ms, offers())
+            } else {
+                clear
             };
             self.held_up.looked(now_ms, clear.is_some(), nth.is_some());
             if executive.stands() {

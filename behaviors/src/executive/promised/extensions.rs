@@ -43,17 +43,13 @@ impl Executive {
         lead_ms: u64,
         is_open: &dyn Fn(u16) -> bool,
     ) -> Vec<Extension> {
-        let mut ways = Vec::new();
-        let mut from_all: Option<Unreached> = None;
+        let (mut ways, mut unreached) = (Vec::new(), Vec::new());
         for (cut_m, cut) in self.cuts(at_ms, lead_ms) {
             let mut events = Vec::new();
             ways.push(self.way(cut_m, cut, is_open, &mut events));
-            let here = Unreached::of(&events);
-            from_all = Some(match from_all {
-                None => here,
-                Some(before) => before.and(&here),
-            });
+            unreached.push(Unreached::of(&events));
         }
+        let from_all = unreached.into_iter().reduce(|all, here| all.and(&here));
         self.refuse(at_ms, &from_all.unwrap_or_default());
         let mut ways: Vec<Way> = ways.into_iter().filter(|w| !w.moves.is_empty()).collect();
         ways.sort_by(|a, b| (a.cut_m + a.idle_m).total_cmp(&(b.cut_m + b.idle_m)));

@@ -14,7 +14,7 @@
 //! | proposing | withdrawn by the caller, for time | flying | that it is withdrawn |
 //! | proposing, not pleading | it conflicts with what stands, or with a proposal that goes before | flying | that it is withdrawn |
 //! | flying | a wish that conflicts with what others fly ([`Promises::plead`]) | proposing | the proposal, which they may make room for |
-//! | any | a proposal that keeps apart from the motion in force and the own proposal | same | that it is accepted |
+//! | any | a proposal that keeps apart from the motion in force and from the own proposal, unless that pleads | same | that it is accepted |
 //! | proposing | a proposal that goes before the own and conflicts with it alone | flying | the own is withdrawn, the other accepted |
 //! | any | a proposal that conflicts with the motion in force, or goes behind | same | nothing |
 //! | any | another motion in force, a withdrawal | same | nothing: what was accepted of it is free again |
@@ -29,6 +29,8 @@
 //! force (then it is held against as such). And what B had in force or on offer when it
 //! accepted was held against a then. So there is no moment at which B may adopt what
 //! conflicts with a, and none at which A may. `tests/promises.rs` searches this exhaustively.
+//! What pleads is not held against what is accepted; so it is adopted only if it is clear then of
+//! all that was accepted and stands.
 //!
 //! Of two proposals that conflict, that of the UAV with less endurance goes before, of equal
 //! ones that with the lower number: the order is total, so somebody always gets through.
@@ -366,18 +368,14 @@ impl<M: Clone> Promises<M> {
         apart: &dyn Fn(&M, &M) -> bool,
     ) -> Settled {
         let mut settled = Settled::default();
-        let is_clear = |promises: &Self| {
-            let proposal = promises.proposal.as_ref();
-            proposal.is_none_or(|own| promises.is_clear(&own.motion, apart))
-        };
-        if !self.pleads && !is_clear(self) {
+        if !self.pleads && !self.offers_what_is_clear(apart) {
             self.proposal = None;
             settled.gave_way = true;
         }
         let accepted = self.accept(apart);
         // Who is not asked accepts nothing, and need not have made room for what pleads.
-        let may_adopt = may_adopt && (!self.pleads || is_clear(self));
-        if may_adopt && self.is_agreed(is_asked) {
+        let made_room = || !self.pleads || self.offers_what_is_clear(apart);
+        if may_adopt && self.is_agreed(is_asked) && made_room() {
             if let Some(own) = self.proposal.take() {
                 self.in_force = own;
             }
@@ -399,6 +397,12 @@ impl<M: Clone> Promises<M> {
             o.standing().all(|m| apart(motion, m))
                 && before.is_none_or(|p| apart(motion, &p.motion))
         })
+    }
+
+    /// The same of the own proposal, if there is one.
+    fn offers_what_is_clear(&self, apart: &dyn Fn(&M, &M) -> bool) -> bool {
+        let own = self.proposal.as_ref();
+        own.is_none_or(|own| self.is_clear(&own.motion, apart))
     }
 
     /// Accepts the proposals of others that keep apart from all that this UAV may fly.
