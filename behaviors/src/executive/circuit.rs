@@ -195,9 +195,9 @@ impl Measured<'_> {
             let now_m = then_m + speed_mps * f64::from(other.age_ms) / 1000.0;
             Some((now_m - at_m).rem_euclid(self.whole_m))
         };
-        let all = || others.iter().filter_map(ahead_m);
-        let ahead_m = all().min_by(f64::total_cmp)?;
-        let farthest_m = all().max_by(f64::total_cmp)?;
+        let all: Vec<f64> = others.iter().filter_map(ahead_m).collect();
+        let ahead_m = all.iter().copied().min_by(f64::total_cmp)?;
+        let farthest_m = all.iter().copied().max_by(f64::total_cmp)?;
         Some(Gaps {
             ahead_m,
             behind_m: self.whole_m - farthest_m,
@@ -209,9 +209,11 @@ impl Measured<'_> {
 /// `None` where it is not on the loop.
 fn nearest(marks: &[Mark], pose: Pose) -> Option<(&Mark, f64)> {
     let cost_m = |mark: &Mark| {
-        let off_m = (pose.position() - mark.pose.position()).norm();
-        let turned = cos(pose.heading_rad - mark.pose.heading_rad);
-        (off_m <= OFF_M).then_some(off_m + AGAINST_M * (1.0 - turned))
+        let off = pose.position() - mark.pose.position();
+        (off.dot(&off) <= OFF_M * OFF_M).then(|| {
+            let turned = cos(pose.heading_rad - mark.pose.heading_rad);
+            off.norm() + AGAINST_M * (1.0 - turned)
+        })
     };
     let costs = marks.iter().filter_map(|m| Some((cost_m(m)?, m)));
     let (_, nearest) = costs.min_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -41,9 +41,9 @@ use crate::gathering::Gathering;
 use crate::input::Time;
 use crate::mission::mm;
 use crate::mission_state::{MissionState, RelayPosition, speed_mmps};
-use crate::offload::Job;
+use crate::offload::{Job, MissionGeometry};
 use crate::output::{Report, TaskNews};
-use crate::protocol::auction::flown::RoutedTime;
+use crate::protocol::auction::flown::{AskedWays, RoutedTime};
 use crate::protocol::auction::{self, Auction, Event, KNOWN_MAX, Version};
 use crate::targets::Targets;
 use crate::task_desk::TaskHolder;
@@ -69,6 +69,7 @@ use skein_geometry::hash::{Fnv, folded};
 use skein_geometry::math::wrap_pi;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{Hash, Hasher};
+use std::sync::Arc;
 pub use tracking::Follows;
 
 /// A task whose flight did not see all of it is flown once more, then others are asked.
@@ -134,6 +135,8 @@ pub(crate) struct Tasking {
     flies: Option<Airframe>,
     sensors: u32,
     pub(crate) auction: Auction,
+    /// Ways round the zones of the mission for which bids were made last.
+    ways: Option<(Arc<MissionGeometry>, AskedWays)>,
     pub(crate) known: BTreeMap<TaskId, Known>,
     pub(crate) bundles: BTreeMap<PeerId, (Version, Bundle)>,
     /// What the auction was not told yet.
@@ -170,6 +173,7 @@ impl Tasking {
             flies: config.airframe.filter(|_| config.role == Role::Uav),
             sensors: config.sensors,
             auction: Auction::new(config.id, 0, Offer::default()),
+            ways: None,
             known: BTreeMap::new(),
             bundles: BTreeMap::new(),
             news: BTreeSet::new(),
@@ -418,7 +422,7 @@ impl Tasking {
             effects.retain(|e| !matches!(e, Effect::Negotiate));
             return effects;
         }
-        let geometry = std::sync::Arc::clone(&state.geometry);
+        let geometry = Arc::clone(&state.geometry);
         let brought = self.take_brought(s.now, &geometry.mission, state.stage.ended());
         let found = if s.speaks {
             self.detect(s, state)
@@ -603,10 +607,18 @@ impl Tasking {
 
     /// Lets the auction handle events; what it gives to fly is planned.
     fn handle(&mut self, events: Vec<Event>, state: &mut MissionState) -> Effects {
-        let geometry = std::sync::Arc::clone(&state.geometry);
-        let ways = RoutedTime::new(&geometry.router);
+        let of_mission =
+            |(geometry, _): &(Arc<MissionGeometry>, _)| Arc::ptr_eq(geometry, &state.geometry);
+        let (geometry, asked) = self
+            .ways
+            .take()
+            .filter(of_mission)
+            .unwrap_or_else(|| (Arc::clone(&state.geometry), AskedWays::default()));
+        let bids = RoutedTime::new(&geometry.router, &asked);
+        let settled = self.auction.handle(events, &bids);
+        self.ways = Some((geometry, asked));
         let mut effects = Effects::new();
-        for effect in self.auction.handle(events, &ways) {
+        for effect in settled {
             match effect {
                 auction::Effect::Publish => {}
                 auction::Effect::Drop(id) => {
@@ -645,7 +657,7 @@ impl Tasking {
         let task = &self.known.get(&flown.id)?.task;
         let (executive, airframe) = (state.executive.as_ref()?, self.flies?);
         let request = Request {
-            geometry: std::sync::Arc::clone(&state.geometry),
+            geometry: Arc::clone(&state.geometry),
             task: self.as_flown((flown.id, flown.revision), task, &state.geometry.mission),
             from: executive.pose()?,
             airspeed_mps: airframe.cruise_mps,

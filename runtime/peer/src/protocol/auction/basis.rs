@@ -19,12 +19,18 @@ impl Auction {
         all
     }
 
-    /// What is to be settled, with claims as they are; and whether claims of those who are
-    /// only on their way are open too.
-    pub(super) fn problem(&self, moves: bool) -> Problem {
+    /// What is to be settled with claims as they are; and where claims of those who are only on
+    /// their way are open too.
+    pub(super) fn problems(&self) -> (Problem, Problem) {
         let bidders = self.bidders();
-        let (holders, open) = self.to_be_had(&bidders, moves);
-        let held_back = self.held_back(&bidders, &holders, &open);
+        let open = self.open_before_claims(&bidders);
+        let problem = |moves| self.problem(&bidders, &open, moves);
+        (problem(false), problem(true))
+    }
+
+    fn problem(&self, bidders: &[(PeerId, &Bundle)], open: &[TaskId], moves: bool) -> Problem {
+        let (holders, open) = self.to_be_had(bidders, open, moves);
+        let held_back = self.held_back(bidders, &holders, &open);
         let bidder = |(id, bundle): &(PeerId, &Bundle)| {
             let first = kept(bundle).map(|t| t.task);
             let mine = |t: &TaskId| holders.get(t).is_some_and(|h| h.2.0 == *id);
@@ -54,10 +60,21 @@ impl Auction {
         }
     }
 
-    /// Which tasks are somebody's, and which are to be had.
+    /// What is to be done, whoever claims it, ascending.
+    pub(super) fn open_before_claims(&self, bidders: &[(PeerId, &Bundle)]) -> Vec<TaskId> {
+        let done = self.done_before_offers(bidders);
+        let open = self
+            .tasks
+            .iter()
+            .filter(|(id, task)| self.counts_open(**id, task) && !done.contains(id));
+        open.map(|(id, _)| *id).collect()
+    }
+
+    /// Which tasks are somebody's, and which of those to be done are to be had.
     pub(super) fn to_be_had(
         &self,
         bidders: &[(PeerId, &Bundle)],
+        open: &[TaskId],
         moves: bool,
     ) -> (BTreeMap<TaskId, Rank>, Vec<TaskId>) {
         let mut holders: BTreeMap<TaskId, Rank> = BTreeMap::new();
@@ -70,12 +87,9 @@ impl Auction {
                 *best = (*best).max(rank(*id, held));
             }
         }
-        let done = self.done_before_offers(bidders);
-        let open = self.tasks.iter().filter(|(id, task)| {
-            self.counts_open(**id, task) && !holders.contains_key(id) && !done.contains(id)
-        });
-        let open = open.map(|(id, _)| *id).collect();
-        (holders, open)
+        let free = open.iter().filter(|id| !holders.contains_key(id));
+        let free = free.copied().collect();
+        (holders, free)
     }
 
     /// What was done before the offers of those who live, and what others did at all: what
@@ -119,8 +133,7 @@ impl Auction {
             (id, task.revision_as_asked(), self.counts_open(*id, task)).hash(&mut hash);
         }
         self.map.hash(&mut hash);
-        self.problem(false).hash(&mut hash);
-        self.problem(true).hash(&mut hash);
+        self.problems().hash(&mut hash);
         folded(Hasher::finish(&hash)).max(1)
     }
 }

@@ -120,24 +120,43 @@ impl Ways for FlownTime {
     }
 }
 
+/// How many ways are remembered at once: those between some hundred places.
+const REMEMBERED_MAX: usize = 1 << 14;
+
+/// Ways round the zones of one mission that were asked for before: the same places come up in
+/// settlement after settlement.
+#[derive(Debug, Default)]
+pub struct AskedWays(RefCell<BTreeMap<[u64; 7], f64>>);
+
+impl AskedWays {
+    fn remembered_m(&self, ends: [u64; 7], ask_m: impl FnOnce() -> f64) -> f64 {
+        if let Some(way_m) = self.0.borrow().get(&ends) {
+            return *way_m;
+        }
+        let way_m = ask_m();
+        let mut asked = self.0.borrow_mut();
+        if asked.len() >= REMEMBERED_MAX {
+            asked.clear();
+        }
+        asked.insert(ends, way_m);
+        way_m
+    }
+}
+
 /// What tasks are worth by flown time round the no-fly zones of a mission: all who hold the
 /// same zones get the same.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct RoutedTime<'a> {
     router: &'a Router,
-    /// What was asked before, by poses to the millimetre.
-    asked: RefCell<BTreeMap<[i64; 6], f64>>,
+    asked: &'a AskedWays,
 }
 
 impl<'a> RoutedTime<'a> {
-    /// Ways by this router; where it knows none they are reckoned as if there were no zones,
-    /// and whoever is to fly them finds out.
+    /// Ways by this router, of which `asked` remembers those of no other one; where it knows none
+    /// they are reckoned as if there were no zones, and whoever is to fly them finds out.
     #[must_use]
-    pub fn new(router: &'a Router) -> Self {
-        Self {
-            router,
-            asked: RefCell::new(BTreeMap::new()),
-        }
+    pub fn new(router: &'a Router, asked: &'a AskedWays) -> Self {
+        Self { router, asked }
     }
 }
 
@@ -147,27 +166,25 @@ impl Ways for RoutedTime<'_> {
         if zones.zones().is_empty() {
             return length_m(from, to, radius_m);
         }
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "a cast of a float saturates"
-        )]
-        let whole = |v: f64| (v * 1000.0).round() as i64;
-        let key = [&from, &to].map(|p| [p.east_m, p.north_m, p.heading_rad].map(whole));
-        let key = [
-            key[0][0], key[0][1], key[0][2], key[1][0], key[1][1], key[1][2],
-        ];
-        if let Some(m) = self.asked.borrow().get(&key) {
-            return *m;
-        }
-        let straight = shortest(from, to, radius_m);
-        let way_m = if zones.is_clear(&straight, self.router.limits().clearance_m) {
-            straight.length_m()
-        } else {
+        let [east, north, heading, to_east, to_north, to_heading] = [
+            from.east_m,
+            from.north_m,
+            from.heading_rad,
+            to.east_m,
+            to.north_m,
+            to.heading_rad,
+        ]
+        .map(f64::to_bits);
+        let radius = radius_m.to_bits();
+        let ends = [east, north, heading, to_east, to_north, to_heading, radius];
+        self.asked.remembered_m(ends, || {
+            let straight = shortest(from, to, radius_m);
+            if zones.is_clear(&straight, self.router.limits().clearance_m) {
+                return straight.length_m();
+            }
             let routed = self.router.route(from, to);
             routed.map_or(straight.length_m(), |way| way.length_m())
-        };
-        self.asked.borrow_mut().insert(key, way_m);
-        way_m
+        })
     }
 }
 
@@ -376,5 +393,43 @@ mod tests {
         assert!(fly(follows, &task(TaskKind::Relay, &[at(100, 0)])).is_none());
         let nowhere = task(TaskKind::Pinpoint, &[]);
         assert_eq!(fly(OFFER, &nowhere), None);
+    }
+
+    #[test]
+    fn ways_round_zones_are_remembered_by_their_ends_and_their_radius() {
+        use skein_flight::route::RouteLimits;
+        use skein_geometry::Polygon;
+        use skein_geometry::clearance::NoFlyZones;
+        let wall = [
+            (500.0, -100.0),
+            (540.0, -100.0),
+            (540.0, 100.0),
+            (500.0, 100.0),
+        ];
+        let wall = Polygon::new(wall.map(|(x, y)| Point::new(x, y)).to_vec());
+        let zones = NoFlyZones::new(vec![wall.unwrap()]);
+        let limits = RouteLimits {
+            turn_radius_m: 70.0,
+            clearance_m: 10.0,
+        };
+        let router = Router::new(std::sync::Arc::new(zones), limits);
+        let asked = AskedWays::default();
+        let routed = RoutedTime::new(&router, &asked);
+        let (from, to) = (Pose::new(Point::origin(), 0.0), Point::new(1200.0, 0.0));
+        let beyond = routed.length_m(from, Pose::new(to, 0.0), 70.0);
+        assert!((1200.5..1300.0).contains(&beyond), "{beyond}");
+        assert_eq!(asked.0.borrow().len(), 1);
+        assert_eq!(routed.length_m(from, Pose::new(to, 0.0), 70.0), beyond);
+        assert_eq!(asked.0.borrow().len(), 1);
+        // Back over its own course, with two circles.
+        let behind = Pose::new(Point::new(-300.0, 0.0), 0.0);
+        let wide = routed.length_m(from, behind, 70.0);
+        let tight = routed.length_m(from, behind, 20.0);
+        assert!(tight < wide, "{tight} {wide}");
+        assert_eq!(asked.0.borrow().len(), 3);
+        for k in 0..=REMEMBERED_MAX {
+            let _ = asked.remembered_m([k as u64; 7], || 1.0);
+        }
+        assert!(asked.0.borrow().len() <= REMEMBERED_MAX);
     }
 }

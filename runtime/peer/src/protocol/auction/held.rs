@@ -54,7 +54,8 @@ impl Auction {
     #[must_use]
     pub fn kept_for_cover(&self) -> BTreeSet<TaskId> {
         let bidders = self.bidders();
-        let (holders, open) = self.to_be_had(&bidders, false);
+        let open = self.open_before_claims(&bidders);
+        let (holders, open) = self.to_be_had(&bidders, &open, false);
         self.held_back(&bidders, &holders, &open)
     }
 

@@ -45,7 +45,10 @@
 //!   which stay as they are. So an owner changes only after a failure or another task.
 //!
 //! # Complexity
-//! An event costs a settlement where the basis changed, else one look at each claim.
+//! An event costs one look at each claim. A settlement is computed where the basis changed,
+//! once its outcome is said or committed to: all who live have the same basis, or a period has
+//! passed without news. While the offers of thirty come in, that is once instead of thirty
+//! times.
 
 mod basis;
 pub mod flown;
@@ -132,6 +135,8 @@ pub struct Auction {
     /// What was said of it last.
     said: Bundle,
     settled: Settlement,
+    /// What is known has changed since it was settled.
+    is_due: bool,
     /// Tasks this peer committed to that all would gain by giving to others.
     moving: BTreeSet<TaskId>,
     /// Tasks or the living changed since the last offer.
@@ -168,6 +173,7 @@ impl Auction {
             },
             said: Bundle::default(),
             settled: Settlement::default(),
+            is_due: false,
             moving: BTreeSet::new(),
             stale: true,
             free: false,
@@ -263,6 +269,10 @@ impl Auction {
     ) -> Vec<Effect> {
         let mut can_follow = false;
         for event in events {
+            if matches!(event, Event::Begun(_)) {
+                // It follows from what would move whether others are to be told.
+                self.settle(settler);
+            }
             can_follow |= self.note(event);
         }
         if !can_follow {
@@ -270,7 +280,8 @@ impl Auction {
         }
         let mut effects = self.drop_lost();
         effects.extend(self.drop_to_cover());
-        self.settle_anew(settler);
+        self.offer_where_due();
+        self.settle_where_used(settler);
         effects.extend(self.give_up_moving(settler));
         effects.extend(self.commit());
         let to_say = self.to_say();
@@ -384,6 +395,7 @@ impl Auction {
                 };
                 // Nothing else changes with time.
                 return self.quiet == self.patience
+                    || self.is_due
                     || self.has_more_to_say()
                     || self.too_many >= self.patience;
             }
@@ -506,37 +518,51 @@ impl Auction {
         lost.iter().map(|id| Effect::Drop(*id)).collect()
     }
 
-    /// Settles, where what is known is not what was settled on; on a new offer where there
-    /// is a reason for one.
-    fn settle_anew<S: Settler>(&mut self, settler: &S) {
+    /// Offers anew where there is a reason for it, and takes note of whether what is known is
+    /// what was settled on.
+    fn offer_where_due(&mut self) {
         let has_acted = |own: &Bundle| {
             let since = own.tasks.iter().skip(usize::from(own.kept));
             since.into_iter().any(|t| t.progress > Progress::Tentative)
         };
-        let changed = self.basis() != self.own.basis;
+        let mut basis = self.basis();
+        let changed = basis != self.own.basis;
         // Who has done all that it had room for offers anew for the rest.
         let mut held = self.own.tasks.iter();
         let spent = self.free
+            && !self.is_due
             && !self.own.tasks.is_empty()
             && !self.settled.unassigned.is_empty()
             && held.all(|t| t.progress > Progress::Tentative);
         let anew = self.stale || ((changed || spent) && has_acted(&self.own));
         if anew {
             self.offer_anew();
+            basis = self.basis();
         }
-        let basis = self.basis();
-        if basis == self.own.basis {
+        if basis != self.own.basis {
+            self.own.basis = basis;
+            self.is_due = true;
+            self.quiet = 0;
+        } else if anew && !self.is_due {
             // The offer may be new and the same as before: what was won stays won.
-            if anew {
-                self.list_won();
-            }
-            return;
+            self.list_won();
         }
-        self.quiet = 0;
-        let (settled, moving) = self.settlement(settler);
-        (self.settled, self.moving) = (settled, moving);
-        self.list_won();
-        self.own.basis = basis;
+    }
+
+    /// Settles once that is said or committed to: not while offers come in, of which every one
+    /// changes it.
+    fn settle_where_used<S: Settler>(&mut self, settler: &S) {
+        if self.quiet > 0 || self.is_agreed() {
+            self.settle(settler);
+        }
+    }
+
+    /// Settles on what is known, unless it has.
+    fn settle<S: Settler>(&mut self, settler: &S) {
+        if core::mem::take(&mut self.is_due) {
+            (self.settled, self.moving) = self.settlement(settler);
+            self.list_won();
+        }
     }
 
     /// Offers what the UAV can do from where it is. What it claims it keeps.
@@ -587,7 +613,7 @@ impl Auction {
 
     /// The settlement, and which of its claims this peer would do better to hand over.
     fn settlement<S: Settler>(&self, settler: &S) -> (Settlement, BTreeSet<TaskId>) {
-        let (stays, moves) = (self.problem(false), self.problem(true));
+        let (stays, moves) = self.problems();
         let settled = settler.settle(&stays, &self.tasks);
         if stays == moves {
             return (settled, BTreeSet::new());
@@ -616,7 +642,8 @@ impl Auction {
         let held = held.filter(|t| t.progress == Progress::Committed && moving.contains(&t.task));
         let lost: Vec<TaskId> = held.map(|t| t.task).collect();
         let effects = self.let_go(&lost);
-        self.settle_anew(settler);
+        self.offer_where_due();
+        self.settle_where_used(settler);
         effects
     }
 

@@ -156,6 +156,44 @@ fn each_gets_what_it_is_best_at_and_doing_it_changes_nothing() {
     );
 }
 
+/// Counts how often it is asked.
+struct Counted<'a>(&'a Worth, std::cell::Cell<u32>);
+
+impl Settler for Counted<'_> {
+    fn settle(&self, problem: &settlement::Problem, tasks: &Tasks) -> Settlement {
+        self.1.set(self.1.get() + 1);
+        self.0.settle(problem, tasks)
+    }
+}
+
+#[test]
+fn while_offers_come_in_nothing_is_settled() {
+    let worth = Worth(vec![vec![2, 3]; 12]);
+    let counted = Counted(&worth, std::cell::Cell::new(0));
+    let mut one = Auction::new(PeerId(0), 1, OFFER);
+    let others: BTreeSet<PeerId> = (1..12).map(PeerId).collect();
+    let _ = one.handle([Event::Live(others.clone())], &counted);
+    for k in 0..2 {
+        let asked = Event::Task(name(k), task(TaskKind::Pinpoint, 1));
+        let _ = one.handle([asked], &counted);
+    }
+    for id in others {
+        let bundle = Bundle {
+            offer: OFFER,
+            ..Bundle::default()
+        };
+        let _ = one.handle([Event::Heard(id, (1, 1), bundle)], &counted);
+        assert!(one.held().is_empty(), "{:?}", one.held());
+    }
+    assert_eq!(counted.1.get(), 0);
+    // A period without news: now it is said, so now it is settled, once.
+    for _ in 0..3 {
+        let _ = one.handle([Event::Period(1)], &counted);
+    }
+    assert_eq!(counted.1.get(), 1);
+    assert_eq!(one.bundle().1.tasks.len(), 1);
+}
+
 #[test]
 fn nobody_commits_before_all_agree_unless_it_has_waited() {
     let mut s = Swarm::new(&[&[10], &[3]]);
