@@ -123,14 +123,17 @@ impl Ways for FlownTime {
 /// How many ways are remembered at once: those between some hundred places.
 const REMEMBERED_MAX: usize = 1 << 14;
 
+/// From where to where, and the turn radius, to the last bit.
+type AskedWay = ([u64; 3], [u64; 3], u64);
+
 /// Ways round the zones of one mission that were asked for before: the same places come up in
 /// settlement after settlement.
 #[derive(Debug, Default)]
-pub struct AskedWays(RefCell<BTreeMap<[u64; 7], f64>>);
+pub struct AskedWays(RefCell<BTreeMap<AskedWay, f64>>);
 
 impl AskedWays {
-    fn remembered_m(&self, ends: [u64; 7], ask_m: impl FnOnce() -> f64) -> f64 {
-        if let Some(way_m) = self.0.borrow().get(&ends) {
+    fn remembered_m(&self, way: AskedWay, ask_m: impl FnOnce() -> f64) -> f64 {
+        if let Some(way_m) = self.0.borrow().get(&way) {
             return *way_m;
         }
         let way_m = ask_m();
@@ -138,7 +141,7 @@ impl AskedWays {
         if asked.len() >= REMEMBERED_MAX {
             asked.clear();
         }
-        asked.insert(ends, way_m);
+        asked.insert(way, way_m);
         way_m
     }
 }
@@ -166,18 +169,9 @@ impl Ways for RoutedTime<'_> {
         if zones.zones().is_empty() {
             return length_m(from, to, radius_m);
         }
-        let [east, north, heading, to_east, to_north, to_heading] = [
-            from.east_m,
-            from.north_m,
-            from.heading_rad,
-            to.east_m,
-            to.north_m,
-            to.heading_rad,
-        ]
-        .map(f64::to_bits);
-        let radius = radius_m.to_bits();
-        let ends = [east, north, heading, to_east, to_north, to_heading, radius];
-        self.asked.remembered_m(ends, || {
+        let exact = |p: Pose| [p.east_m, p.north_m, p.heading_rad].map(f64::to_bits);
+        let asked = (exact(from), exact(to), radius_m.to_bits());
+        self.asked.remembered_m(asked, || {
             let straight = shortest(from, to, radius_m);
             if zones.is_clear(&straight, self.router.limits().clearance_m) {
                 return straight.length_m();
@@ -429,7 +423,7 @@ mod tests {
         assert!(tight < wide, "{tight} {wide}");
         assert_eq!(asked.0.borrow().len(), 3);
         for k in 0..=REMEMBERED_MAX {
-            let _ = asked.remembered_m([k as u64; 7], || 1.0);
+            let _ = asked.remembered_m(([k as u64; 3], [0; 3], 0), || 1.0);
         }
         assert!(asked.0.borrow().len() <= REMEMBERED_MAX);
     }

@@ -280,8 +280,7 @@ impl Auction {
         }
         let mut effects = self.drop_lost();
         effects.extend(self.drop_to_cover());
-        self.offer_where_due();
-        self.settle_where_used(settler);
+        self.settle_anew(settler);
         effects.extend(self.give_up_moving(settler));
         effects.extend(self.commit());
         let to_say = self.to_say();
@@ -549,9 +548,10 @@ impl Auction {
         }
     }
 
-    /// Settles once that is said or committed to: not while offers come in, of which every one
-    /// changes it.
-    fn settle_where_used<S: Settler>(&mut self, settler: &S) {
+    /// Takes up what is known; settles once that is said or committed to: not while offers come
+    /// in, of which every one changes it.
+    fn settle_anew<S: Settler>(&mut self, settler: &S) {
+        self.offer_where_due();
         if self.quiet > 0 || self.is_agreed() {
             self.settle(settler);
         }
@@ -642,8 +642,7 @@ impl Auction {
         let held = held.filter(|t| t.progress == Progress::Committed && moving.contains(&t.task));
         let lost: Vec<TaskId> = held.map(|t| t.task).collect();
         let effects = self.let_go(&lost);
-        self.offer_where_due();
-        self.settle_where_used(settler);
+        self.settle_anew(settler);
         effects
     }
 
