@@ -26,6 +26,7 @@ use crate::mission::Mission;
 use crate::mission_change::{SeenBefore, executive_for, negotiation_begun, separation_for};
 use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
+use crate::protocol::auction::flown::AskedWays;
 use crate::protocol::division;
 use crate::protocol::negotiation::{Action, Context, Negotiation};
 use crate::protocol::runs::PlannedCell;
@@ -109,6 +110,8 @@ pub(crate) struct RelayPosition {
 #[derive(Debug)]
 pub(crate) struct MissionState {
     pub geometry: Arc<MissionGeometry>,
+    /// Ways round its zones for which bids were made.
+    pub asked_ways: AskedWays,
     pub executive: Option<Executive>,
     /// How it is kept apart from others at its height.
     pub separation: Option<Separation>,
@@ -725,6 +728,7 @@ impl MissionState {
                 .as_ref()
                 .map_or_else(Default::default, |m| m.claims.void()),
             geometry,
+            asked_ways: AskedWays::default(),
             seen_before,
         };
         match old {

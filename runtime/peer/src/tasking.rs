@@ -41,9 +41,9 @@ use crate::gathering::Gathering;
 use crate::input::Time;
 use crate::mission::mm;
 use crate::mission_state::{MissionState, RelayPosition, speed_mmps};
-use crate::offload::{Job, MissionGeometry};
+use crate::offload::Job;
 use crate::output::{Report, TaskNews};
-use crate::protocol::auction::flown::{AskedWays, RoutedTime};
+use crate::protocol::auction::flown::RoutedTime;
 use crate::protocol::auction::{self, Auction, Event, KNOWN_MAX, Version};
 use crate::targets::Targets;
 use crate::task_desk::TaskHolder;
@@ -135,8 +135,6 @@ pub(crate) struct Tasking {
     flies: Option<Airframe>,
     sensors: u32,
     pub(crate) auction: Auction,
-    /// Ways round the zones of the mission for which bids were made last.
-    ways: Option<(Arc<MissionGeometry>, AskedWays)>,
     pub(crate) known: BTreeMap<TaskId, Known>,
     pub(crate) bundles: BTreeMap<PeerId, (Version, Bundle)>,
     /// What the auction was not told yet.
@@ -173,7 +171,6 @@ impl Tasking {
             flies: config.airframe.filter(|_| config.role == Role::Uav),
             sensors: config.sensors,
             auction: Auction::new(config.id, 0, Offer::default()),
-            ways: None,
             known: BTreeMap::new(),
             bundles: BTreeMap::new(),
             news: BTreeSet::new(),
@@ -607,16 +604,8 @@ impl Tasking {
 
     /// Lets the auction handle events; what it gives to fly is planned.
     fn handle(&mut self, events: Vec<Event>, state: &mut MissionState) -> Effects {
-        let of_mission =
-            |(geometry, _): &(Arc<MissionGeometry>, _)| Arc::ptr_eq(geometry, &state.geometry);
-        let (geometry, asked) = self
-            .ways
-            .take()
-            .filter(of_mission)
-            .unwrap_or_else(|| (Arc::clone(&state.geometry), AskedWays::default()));
-        let bids = RoutedTime::new(&geometry.router, &asked);
+        let bids = RoutedTime::new(&state.geometry.router, &state.asked_ways);
         let settled = self.auction.handle(events, &bids);
-        self.ways = Some((geometry, asked));
         let mut effects = Effects::new();
         for effect in settled {
             match effect {
