@@ -211,7 +211,7 @@ impl Witnessed {
             let found = &mut self.found;
             self.counts.on_look(at_ms, &m.vehicles, look, found);
         }
-        if let (Some(watched), Some(life)) = (&said.streets, said.life) {
+        if let (Some(watched), Some(life)) = (&said.streets, said.lives_in) {
             self.streets.on_able(ids);
             let look = StreetLook {
                 uav: (uav, life),

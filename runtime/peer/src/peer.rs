@@ -947,6 +947,13 @@ impl Peer {
         self.life.incarnation() > 0
     }
 
+    /// The life that it is in, whether it speaks already or not: what it counts itself is of that
+    /// life. None before its journal holds it.
+    #[must_use]
+    pub fn lives_in(&self) -> Option<Incarnation> {
+        self.has_life().then_some(self.life.incarnation())
+    }
+
     /// The life in which it speaks at present; none while it only listens.
     #[must_use]
     pub fn speaks_in(&self) -> Option<Incarnation> {

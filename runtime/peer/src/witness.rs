@@ -31,6 +31,8 @@ pub struct Looked {
     pub seen_ms: u64,
     /// The life in which it speaks; none while it only listens.
     pub life: Option<Incarnation>,
+    /// The life that it is in, whether it speaks or not.
+    pub lives_in: Option<Incarnation>,
     /// The revision that it follows.
     pub revision: u32,
     /// How often it speaks, milliseconds.
@@ -121,6 +123,7 @@ impl Peer {
         Some(Looked {
             seen_ms: self.sensed_ms()?,
             life: self.speaks_in(),
+            lives_in: self.lives_in(),
             revision: beliefs.revision,
             interval_ms: beliefs.interval_ms,
             is_finished: beliefs.finished,

@@ -44,9 +44,8 @@ const SPEED_OFF_SHARE: f64 = 0.2;
 const SPEED_FROM_S: f64 = 30.0;
 const SPEED_SURE_SHARE: f64 = 0.5;
 
-/// What was watched by no more than this share, and so many metres times seconds: a UAV watches
-/// from its first look on, and the judge from when it speaks in its life, up to five seconds later;
-/// a picture holds up to 300 m of streets.
+/// What was watched by no more than this share, and so many metres times seconds: a picture holds
+/// up to 300 m of streets, and who is late says for some seconds what it watched before.
 const WATCHED_OFF_SHARE: f64 = 0.03;
 const WATCHED_OFF_M_S: f64 = 1_500.0;
 

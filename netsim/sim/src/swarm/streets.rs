@@ -22,7 +22,7 @@ impl Swarm {
         let (Some(mind), Some(body)) = (&peer.peer, world.body(id)) else {
             return;
         };
-        let (Some(watched), Some(life)) = (mind.watched_streets(), mind.speaks_in()) else {
+        let (Some(watched), Some(life)) = (mind.watched_streets(), mind.lives_in()) else {
             return;
         };
         let look = StreetLook {
@@ -59,7 +59,7 @@ impl Swarm {
     fn ask_of_streets(&mut self) {
         for p in &self.peers {
             let minds = p.peer.as_ref().filter(|_| p.process == Process::Running);
-            let life = minds.and_then(|mind| Some((mind, mind.speaks_in()?)));
+            let life = minds.and_then(|mind| Some((mind, mind.lives_in()?)));
             if let Some((mind, life)) = life
                 && let Some(own) = mind.own_usages()
             {

@@ -7,7 +7,7 @@
 //! | tentative | seen in [`CONFIRMED_HITS`] of [`LOOKS`] looks | confirmed |
 //! | tentative | not seen in [`MISSED`] looks in which it should be | dropped |
 //! | confirmed | out of sight, hidden, not recognised | confirmed, less and less sure |
-//! | confirmed | seen in the grown gate | confirmed: found again, under its name |
+//! | confirmed | seen in the grown gate | confirmed: found again, under its name; if it may have been farther away than [`AFRESH_M`], as if it was seen for the first time |
 //! | confirmed | not seen in [`GONE`] looks in which it should be | dropped; a younger track near to where it may be is it, and gets its name |
 //! | confirmed | less sure than [`LOST_M`] | dropped |
 //!
@@ -33,6 +33,10 @@ pub const GONE: u32 = 8;
 /// Standard deviation of its place beyond which a target is lost, metres: what a camera at
 /// 120 m sees to either side.
 pub const LOST_M: f64 = 150.0;
+
+/// Standard deviation of its place beyond which where a target is found tells nothing of how it got
+/// there, metres: it may as well be another one, that came into view where the lost one could be.
+pub const AFRESH_M: f64 = 15.0;
 
 /// How fast a target may have gone where it was not expected, m/s.
 const STRAYS_MPS: f64 = 40.0;
@@ -179,7 +183,7 @@ impl Tracks {
                 continue;
             };
             let track = &mut self.tracks[of];
-            if let Some(better) = track.estimate.with(&sighting.detection) {
+            if let Some(better) = track.seen(now_ms, &sighting.detection) {
                 track.estimate = better;
                 track.seen_ms = now_ms;
                 hit[of] = true;
@@ -294,6 +298,15 @@ impl Track {
         self.seen_ms.saturating_sub(self.begun_ms)
     }
 
+    /// Where it is with one more detection. How fast it must have been to come here from where it
+    /// was seen last is no measurement of its speed where that is long ago.
+    fn seen(&self, now_ms: u64, detection: &Detection) -> Option<Estimate> {
+        if self.estimate.spread_m() > AFRESH_M {
+            return Some(Estimate::first(now_ms, detection)).filter(Estimate::is_sound);
+        }
+        self.estimate.with(detection)
+    }
+
     /// The logarithm of how large its spread is: the less the surer.
     fn sureness(&self) -> f64 {
         skein_geometry::math::ln(self.estimate.spread_m().max(f64::MIN_POSITIVE))
@@ -334,6 +347,7 @@ mod tests {
     use super::super::estimate::tests::{DENSITY, seen, wandered};
     use super::*;
     use nalgebra::{Matrix2, Vector4};
+    use skein_geometry::frame::Vector;
     use skein_geometry::random::SplitMix64;
 
     const CAR: Kind = Kind(1);
@@ -372,6 +386,34 @@ mod tests {
         assert!(!sees(&tracks), "all were seen a second ago");
         tracks.look(3_200, &new, &nowhere);
         assert!(sees(&tracks) && tracks.all().len() == MOST_TRACKS);
+    }
+
+    /// One after the other leaves the picture at one end, and others come in at the other one: each
+    /// new one is where a lost one could be, and would seem to have come from there.
+    #[test]
+    fn who_comes_into_view_has_not_the_speed_at_which_a_lost_one_could_be_there() {
+        let mut random = SplitMix64::new(11);
+        let mut tracks = Tracks::new(1, DENSITY);
+        let sees = |p: Point| p.x.abs() < 60.0;
+        let mut highest_mps: f64 = 0.0;
+        for look in 1..=600_u32 {
+            let at_s = 0.2 * f64::from(look);
+            let cars = (0..60).map(|i| Point::new(10.0 * at_s - 40.0 * f64::from(i), 0.0));
+            let seen: Vec<Sighting> = cars
+                .filter(|p| sees(*p))
+                .map(|p| sighting(p, &mut random))
+                .collect();
+            tracks.look(200 * u64::from(look), &seen, &sees);
+            let is_sure = |t: &&Track| {
+                let c = t.estimate.covariance;
+                t.seen_ms == 200 * u64::from(look) && c[(2, 2)] + c[(3, 3)] < 25.0
+            };
+            for t in tracks.confirmed().filter(is_sure) {
+                let v = t.estimate.velocity_mps();
+                highest_mps = highest_mps.max((v - Vector::new(10.0, 0.0)).norm());
+            }
+        }
+        assert!(highest_mps < 11.0, "{highest_mps}");
     }
 
     #[test]

@@ -423,14 +423,17 @@ impl Relay {
     }
 
     /// What this peer bids and claims itself goes before all else, once: nobody else can say
-    /// it. Sent again it waits its turn, or what this peer has seen would never be said.
+    /// it; and so does that its mission is finished, which is so short that nothing waits for it.
+    /// Sent again it waits its turn, or what this peer has seen would never be said.
     /// Where many share the channel its coverage goes next: claims that others wrote and that
     /// wait for longer than coverage lives would never let it go.
     fn standing(&self, key: &RecordKey, priority: Priority) -> Standing {
         let unsaid = || self.held.get(key).is_some_and(|h| h.copies == 0);
+        let is_end = key.1 == Kind::Finished.number();
         match priority {
             _ if key.0 != self.me => Standing::Due,
             Priority::Conflict | Priority::Claim if unsaid() => Standing::First,
+            Priority::Telemetry if is_end && unsaid() => Standing::First,
             Priority::Beacon => Standing::Coverage,
             _ => Standing::Due,
         }
