@@ -1,7 +1,7 @@
 //! What peers mark as covered: truly seen (S6), never forgotten (S3), and soon known
 //! to all (L4).
 
-use super::{Findings, Grade, Snapshot};
+use super::{Findings, Snapshot};
 use skein_peer::cells::CellSet;
 use std::collections::BTreeMap;
 
@@ -17,9 +17,10 @@ const LOSSY_FACTOR: u64 = 5;
 /// And so many at loss 0 over several hops. A cell is known to who saw it alone until somebody
 /// hears of it, and at the edge all who do may be in earshot of stations that their author cannot
 /// hear: then one transmission in two arrives. Within the bound at D = 2 it says so five times,
-/// twice as news and thrice with all; of a hundred such cells three would be later, within two
-/// bounds one of a thousand. In one hop nothing is hidden.
-const HIDDEN_FACTOR: u64 = 2;
+/// twice as news and thrice with all; of a hundred such cells three would be later, of a thousand
+/// one than two bounds, of a million one than four. A thousand storms have millions. In one hop
+/// nothing is hidden.
+const HIDDEN_FACTOR: u64 = 4;
 
 /// Which covered cells one peer does not know of that others of its component do.
 #[derive(Clone, Debug)]
@@ -116,8 +117,7 @@ impl CoverCheck {
     fn check_spread(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let n = snapshot.covered.capacity();
         let bounds = snapshot.bounds;
-        let hidden = snapshot.grade() == Grade::Hard && bounds.diameter > 1;
-        let hidden = if hidden { HIDDEN_FACTOR } else { 1 };
+        let hidden = if snapshot.collides() { HIDDEN_FACTOR } else { 1 };
         let bound_ms = bounds.spread_ms() + WHOLE_PERIODS * bounds.interval_ms;
         let mut lacks: BTreeMap<u16, (CellSet, u64)> = BTreeMap::new();
         for component in snapshot.graph.components() {

@@ -98,6 +98,8 @@ struct Watcher {
 struct Lack {
     wanted: Sector,
     since_ms: u64,
+    /// Since when that is whether it is too dense.
+    urgent_ms: Option<u64>,
     told: bool,
 }
 
@@ -430,24 +432,30 @@ impl CrowdCheck {
                     let fresh = Lack {
                         wanted: *wanted,
                         since_ms: snapshot.now_ms,
+                        urgent_ms: None,
                         told: false,
                     };
                     let lack = self.lacks.entry(key).or_insert(fresh);
                     if held.joined(lack.wanted) == held {
                         *lack = fresh;
                     }
-                    let from_ms = lack.since_ms.max(whole_ms).max(m.since_ms);
-                    let took_ms = snapshot.now_ms - from_ms;
                     let is_urgent = held.dense().is_some() != wanted.dense().is_some();
+                    let urgent_ms = lack.urgent_ms.unwrap_or(snapshot.now_ms);
+                    lack.urgent_ms = is_urgent.then_some(urgent_ms);
                     let (record_ms, factor) = record_limit(&snapshot.bounds, here.len());
-                    let bound_ms = record_ms + if is_urgent { 0 } else { again_ms };
-                    let factor = if is_urgent { factor } else { AGAIN_FACTOR };
-                    let limit_ms = light_limit_ms(snapshot, bound_ms, factor, from_ms);
-                    let is_late = limit_ms.is_some_and(|l| took_ms > l);
-                    if is_late && !core::mem::replace(&mut lack.told, true) {
-                        found.broken("crowd-agree", snapshot.now_ms, Some(m.id), || {
-                            format!("knows less of sector {sector} than its component was told {took_ms} ms ago (bound {bound_ms} ms)")
-                        });
+                    let slow = (Some(lack.since_ms), record_ms + again_ms, AGAIN_FACTOR);
+                    for (since_ms, bound_ms, factor) in [slow, (lack.urgent_ms, record_ms, factor)]
+                    {
+                        let Some(since_ms) = since_ms else { continue };
+                        let from_ms = since_ms.max(whole_ms).max(m.since_ms);
+                        let took_ms = snapshot.now_ms - from_ms;
+                        let limit_ms = light_limit_ms(snapshot, bound_ms, factor, from_ms);
+                        let is_late = limit_ms.is_some_and(|l| took_ms > l);
+                        if is_late && !core::mem::replace(&mut lack.told, true) {
+                            found.broken("crowd-agree", snapshot.now_ms, Some(m.id), || {
+                                format!("knows less of sector {sector} than its component was told {took_ms} ms ago (bound {bound_ms} ms)")
+                            });
+                        }
                     }
                 }
             }

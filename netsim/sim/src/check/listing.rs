@@ -2,7 +2,7 @@
 
 use super::membership::Membership;
 use super::snapshot::is_alone;
-use super::{Clocks, Findings, PeerSnapshot, Snapshot};
+use super::{Clocks, Findings, Grade, PeerSnapshot, Snapshot};
 use skein_peer::PeerId;
 use skein_peer::cells::CellSet;
 use skein_peer::output::Status;
@@ -295,10 +295,13 @@ impl ListingCheck {
         let counts_from_ms = from_ms.max(counts_from_ms).max(o.heeded_ms);
         let took_ms = snapshot.now_ms.saturating_sub(counts_from_ms);
         let bound_ms = snapshot.takeover_ms(counts_from_ms);
-        let graded = snapshot
-            .grade()
-            .limit_ms(bound_ms)
-            .is_some_and(|l| took_ms > l);
+        // A bid or a section that collides is lost as any other is: one more round.
+        let grade = if snapshot.collides() {
+            Grade::Light
+        } else {
+            snapshot.grade()
+        };
+        let graded = grade.limit_ms(bound_ms).is_some_and(|l| took_ms > l);
         let gone_ms = snapshot
             .now_ms
             .saturating_sub(from_ms.max(self.able_since_ms.unwrap_or(snapshot.now_ms)));

@@ -58,6 +58,13 @@ impl Snapshot<'_> {
         Grade::of(self.loss_permille)
     }
 
+    /// Whether what somebody says may be lost though nothing is: over several hops it collides with
+    /// what others say whom it cannot hear.
+    #[must_use]
+    pub fn collides(&self) -> bool {
+        self.grade() == Grade::Hard && self.bounds.diameter > 1
+    }
+
     /// How long something may take by now that all do together, that began at `from_ms`
     /// and takes `bound_ms` among healthy peers.
     #[must_use]

@@ -281,3 +281,35 @@ fn who_lacks_for_long_what_its_component_was_told_is_found() {
     run(&mut scene, &mut Story::new(0), 0, 300, true);
     assert_eq!(scene.broken(), [""; 0]);
 }
+
+/// That a sector became too dense reaches all sooner than how many there are; and what was lacked
+/// before it became so says nothing of that.
+#[test]
+fn whether_a_sector_is_too_dense_has_a_clock_of_its_own() {
+    let limit_s = |dense_from_s: u64| {
+        let mut scene = Scene::new(100);
+        scene.check.revision = 1;
+        let (says, dense) = (scene.sector(30, false), scene.sector(100, true));
+        let mut story = Story::new(0);
+        (0..400).find(|s| {
+            let told = if *s < dense_from_s { says } else { dense };
+            let views = [(1, vec![(SECTOR, told)]), (2, Vec::new())];
+            let views = views.map(|(id, crowd)| {
+                let view = skein_peer::Beliefs {
+                    crowd,
+                    ..speaking()
+                };
+                (id, view)
+            });
+            story.snapshot(1_000 * s, &views, |snapshot| {
+                let flight = FlightCheck::new(BTreeMap::new(), Vec::new(), 10.0);
+                let flyers = (&BTreeMap::new(), &flight);
+                scene.check.on_snapshot(snapshot, flyers, &mut scene.found);
+            });
+            !scene.broken().is_empty()
+        })
+    };
+    let (at_once_s, never_s) = (limit_s(0).unwrap(), limit_s(1_000).unwrap());
+    assert!(2 * at_once_s < never_s, "{at_once_s} s for {never_s} s");
+    assert_eq!(limit_s(60), Some(60 + at_once_s));
+}
