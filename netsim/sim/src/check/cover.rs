@@ -117,7 +117,11 @@ impl CoverCheck {
     fn check_spread(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let n = snapshot.covered.capacity();
         let bounds = snapshot.bounds;
-        let hidden = if snapshot.collides() { HIDDEN_FACTOR } else { 1 };
+        let hidden = if snapshot.collides() {
+            HIDDEN_FACTOR
+        } else {
+            1
+        };
         let bound_ms = bounds.spread_ms() + WHOLE_PERIODS * bounds.interval_ms;
         let mut lacks: BTreeMap<u16, (CellSet, u64)> = BTreeMap::new();
         for component in snapshot.graph.components() {

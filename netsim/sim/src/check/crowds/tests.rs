@@ -248,6 +248,38 @@ fn ranges_that_do_not_hold_are_found_and_so_are_wrong_sums() {
 }
 
 #[test]
+fn some_sums_of_all_people_may_be_wrong_and_none_by_far() {
+    for (wrong, far, broken) in [(2, false, false), (8, false, true), (1, true, true)] {
+        let mut scene = Scene::new(100);
+        for k in 0..10 {
+            scene.look(over(), None);
+            let watch = watch();
+            let says = |n: u16| {
+                let truly = scene.people.within(watch.middle(n).unwrap(), 20.0);
+                let truly = u16::try_from(truly).unwrap();
+                let people = match k < wrong {
+                    true if far => 3 * truly,
+                    true => truly + truly / 6,
+                    false => truly,
+                };
+                let mut says = scene.sector(people, false);
+                if let Some(look) = &mut says.look {
+                    look.seen_ms = 1_000 * scene.second;
+                }
+                (n, says)
+            };
+            let known = Crowd::new(Arc::new(watch.clone()), watch.sectors().map(says).collect());
+            scene.check.judge_people(30_000 * (k + 1), &known);
+        }
+        scene.check.on_end(400_000, &mut scene.found);
+        let (hold, off) = (scene.check.people_then, scene.check.people_off);
+        let is_found = scene.broken().contains(&"crowd-people");
+        assert_eq!(is_found, broken, "{wrong} {far} {hold:?} {off}");
+        assert_eq!(hold, (10 - u32::try_from(wrong).unwrap(), 10));
+    }
+}
+
+#[test]
 fn who_lacks_for_long_what_its_component_was_told_is_found() {
     let mut scene = Scene::new(100);
     let says = scene.sector(30, false);
