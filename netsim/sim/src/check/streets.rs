@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 mod truth;
 mod ways;
-use truth::{Driven, Located, Seen};
+use truth::{Driven, Located, Reaches, Seen};
 pub use ways::{HintReport, StreetsReport};
 
 /// The time that a UAV counted in one life is off by no more than this, seconds, and this share;
@@ -108,6 +108,7 @@ pub struct StreetLook<'a> {
 pub struct StreetCheck {
     of: u32,
     streets: Option<(Arc<Streets>, Arc<Network>)>,
+    reaches: Reaches,
     /// Whether the mission tells what hides streets.
     has_buildings: bool,
     now_ms: u64,
@@ -145,6 +146,7 @@ impl StreetCheck {
                 let network = Arc::new(streets.network());
                 *self = Self {
                     pictured_at: vec![0; network.places().len()],
+                    reaches: Reaches::of(&network),
                     of,
                     ..Self::default()
                 };
@@ -252,7 +254,7 @@ impl StreetCheck {
         *self.lasted_ms.entry(interval).or_default() += apart_ms;
         let vehicles = truth.iter().zip(&mut self.places).zip(&mut self.located);
         for ((at, before), located) in vehicles {
-            let turn = located.step(network, (*before, *at), (now_ms, apart_ms));
+            let turn = located.step((network, &self.reaches), (*before, *at), (now_ms, apart_ms));
             *before = *at;
             if let Some((stretch, _)) = located.on {
                 let driven = self.all.entry((interval, stretch)).or_default();

@@ -3,7 +3,8 @@
 //! Lines that share a point meet there. A vehicle drives on from where it is and chooses at
 //! each crossing; only in a dead end does it turn round.
 
-use skein_geometry::frame::Point;
+use skein_geometry::frame::{Point, Vector};
+use skein_geometry::math::{TAU, atan2, tan, wrap_pi};
 use skein_geometry::random::SplitMix64;
 use std::collections::BTreeMap;
 
@@ -18,6 +19,14 @@ const LEAST_M: f64 = 200.0;
 pub struct Roads {
     places: Vec<Point>,
     neighbours: Vec<Vec<usize>>,
+    /// Of each place, from each neighbour to each: the tangent of half the turn there.
+    turns: Vec<Vec<f64>>,
+}
+
+/// The tangent of half the turn from one piece of road into the next, at most that of a hairpin.
+fn half_turn(before: Vector, after: Vector) -> f64 {
+    let turn_rad = wrap_pi(atan2(after.y, after.x) - atan2(before.y, before.x)).abs();
+    tan((turn_rad / 2.0).min(TAU / 4.0 - 0.05)).max(1e-6)
 }
 
 impl Roads {
@@ -144,9 +153,32 @@ impl Roads {
             let next = self.neighbours[*old].iter();
             next.filter_map(|n| renumbered.get(n).copied()).collect()
         });
+        let places: Vec<Point> = kept.iter().map(|i| self.places[*i]).collect();
+        let neighbours: Vec<Vec<usize>> = neighbours.collect();
+        let turns = neighbours.iter().zip(&places).map(|(next, at)| {
+            let all = next
+                .iter()
+                .flat_map(|from| next.iter().map(move |to| (*from, *to)));
+            all.map(|(from, to)| half_turn(at - places[from], places[to] - at))
+                .collect()
+        });
         Self {
-            places: kept.iter().map(|i| self.places[*i]).collect(),
-            neighbours: neighbours.collect(),
+            turns: turns.collect(),
+            neighbours,
+            places,
+        }
+    }
+
+    /// The tangent of half the turn at a place, from one neighbour to another or back to it.
+    pub(super) fn half_turn(&self, from: usize, at: usize, to: usize) -> f64 {
+        let next = &self.neighbours[at];
+        let nth = |of: usize| next.iter().position(|n| *n == of);
+        match (nth(from), nth(to)) {
+            (Some(i), Some(j)) => self.turns[at][i * next.len() + j],
+            _ => half_turn(
+                self.places[at] - self.places[from],
+                self.places[to] - self.places[at],
+            ),
         }
     }
 }

@@ -7,7 +7,7 @@
 use super::roads::Roads;
 use serde::{Deserialize, Serialize};
 use skein_geometry::frame::{Point, Vector};
-use skein_geometry::math::{TAU, atan2, sin, sin_cos, tan, wrap_pi};
+use skein_geometry::math::{atan2, sin, sin_cos, wrap_pi};
 use skein_geometry::random::SplitMix64;
 
 /// The world moves a vehicle in steps of this, seconds.
@@ -309,13 +309,9 @@ impl Vehicle {
 
 /// How fast a corner of a road is taken, m/s.
 fn corner_mps(roads: &Roads, a: usize, b: usize, c: usize) -> f64 {
-    let (before, after) = (
-        roads.place(b) - roads.place(a),
-        roads.place(c) - roads.place(b),
-    );
-    let turn_rad = wrap_pi(atan2(after.y, after.x) - atan2(before.y, before.x)).abs();
-    let half = tan((turn_rad / 2.0).min(TAU / 4.0 - 0.05)).max(1e-6);
-    (SIDEWAYS_MPS2 * TIGHTEST_M / half).sqrt().max(2.0)
+    (SIDEWAYS_MPS2 * TIGHTEST_M / roads.half_turn(a, b, c))
+        .sqrt()
+        .max(2.0)
 }
 
 #[cfg(test)]

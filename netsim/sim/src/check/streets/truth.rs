@@ -64,6 +64,30 @@ pub struct Seen {
 /// So many stretches are near a place at most.
 const MAY: usize = 6;
 
+/// Of each stretch the box beyond which nobody is taken to be on it: two corners, metres.
+#[derive(Clone, Debug, Default)]
+pub struct Reaches(Vec<(Point, Point)>);
+
+impl Reaches {
+    pub fn of(network: &Network) -> Self {
+        let reach = Vector::new(ASIDE_M + MAY_M, ASIDE_M + MAY_M);
+        let around = |way: &Vec<Point>| {
+            let far = Point::new(f64::INFINITY, f64::INFINITY);
+            let low = way.iter().fold(far, |low, p| low.inf(p));
+            let high = way.iter().fold(-far, |high, p| high.sup(p));
+            (low - reach, high + reach)
+        };
+        Self(network.edges().iter().map(|e| around(&e.way)).collect())
+    }
+
+    fn holds(&self, nth: usize, at: Point) -> bool {
+        let holds = |(low, high): &(Point, Point)| {
+            (low.x..=high.x).contains(&at.x) && (low.y..=high.y).contains(&at.y)
+        };
+        self.0.get(nth).is_some_and(holds)
+    }
+}
+
 /// Where one vehicle is.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Located {
@@ -82,13 +106,13 @@ impl Located {
     /// It moved; says whether it took a turn.
     pub fn step(
         &mut self,
-        network: &Network,
+        (network, reaches): (&Network, &Reaches),
         (before, at): (Point, Point),
         (_, apart_ms): (u64, u64),
     ) -> Option<Turn> {
         let moved = at - before;
         self.speed_mps = moved.norm() / secs(apart_ms.max(1));
-        let (found, may, least_m) = locate(network, at, moved);
+        let (found, may, least_m) = locate((network, reaches), at, moved);
         let place = |(stretch, along_m): (u16, f64)| {
             Some((stretch, network.place_along(stretch, along_m)?))
         };
@@ -116,10 +140,15 @@ type On = Option<(u16, f64)>;
 
 /// On which stretch a vehicle is that moved so, on which ones it may be taken to be, and how far
 /// the nearest is, metres.
-fn locate(network: &Network, at: Point, moved: Vector) -> (On, [On; MAY], f64) {
+fn locate(
+    (network, reaches): (&Network, &Reaches),
+    at: Point,
+    moved: Vector,
+) -> (On, [On; MAY], f64) {
     // The nearest place of each stretch that is near enough.
     let mut near: Vec<(f64, f64, u16, f64)> = Vec::new();
-    for (n, edge) in (0_u16..).zip(network.edges()) {
+    let edges = (0_u16..).zip(network.edges());
+    for (n, edge) in edges.filter(|(n, _)| reaches.holds(usize::from(*n), at)) {
         let mut best: Option<(f64, f64, u16, f64)> = None;
         let mut before_m = 0.0;
         for w in edge.way.windows(2) {

@@ -43,13 +43,37 @@ impl Leg {
     }
 }
 
+/// What is known of all ways from the poses of one station to those of the next.
+#[derive(Clone, Debug, Default)]
+struct Legs {
+    each: Vec<Leg>,
+    /// How long each is as far as is known, metres: nothing else is looked at so often.
+    costs_m: Vec<f64>,
+}
+
+impl Legs {
+    fn of(each: Vec<Leg>) -> Self {
+        let costs_m = each.iter().map(Leg::cost_m).collect();
+        Self { each, costs_m }
+    }
+
+    fn set(&mut self, nth: usize, leg: Leg) {
+        self.costs_m[nth] = leg.cost_m();
+        self.each[nth] = leg;
+    }
+
+    fn open(&self) -> usize {
+        self.costs_m.iter().filter(|m| m.is_finite()).count()
+    }
+}
+
 /// Stations in order, with the poses they may be seen at.
 pub(super) struct Chain<'a> {
     problem: &'a LoopProblem,
     router: &'a Router,
     stands: Vec<(usize, Vec<Pose>)>,
     /// By station of departure: poses of departure times poses of arrival.
-    legs: Vec<Vec<Leg>>,
+    legs: Vec<Legs>,
     routed: Vec<u8>,
     /// By station: how often a leg from or to it was blocked.
     blame: BTreeMap<usize, u32>,
@@ -109,7 +133,7 @@ impl<'a> Chain<'a> {
         (i + 1) % self.stands.len()
     }
 
-    fn guesses(&self, i: usize) -> Vec<Leg> {
+    fn guesses(&self, i: usize) -> Legs {
         let r = self.problem.turn_radius_m;
         let (from, to) = (&self.stands[i].1, &self.stands[self.next(i)].1);
         let mut legs = Vec::with_capacity(from.len() * to.len());
@@ -123,11 +147,17 @@ impl<'a> Chain<'a> {
                 legs.push(Leg::Guess(length_m));
             }
         }
-        legs
+        Legs::of(legs)
     }
 
     fn leg(&self, i: usize, a: usize, b: usize) -> &Leg {
-        &self.legs[i][a * self.stands[self.next(i)].1.len() + b]
+        &self.legs[i].each[a * self.stands[self.next(i)].1.len() + b]
+    }
+
+    /// How long the legs from one pose are as far as is known, metres, by pose of arrival.
+    fn costs_m(&self, i: usize, a: usize) -> &[f64] {
+        let to = self.stands[self.next(i)].1.len();
+        &self.legs[i].costs_m[a * to..(a + 1) * to]
     }
 
     /// A pose for each station, or nothing where some leg has no way left.
@@ -136,49 +166,57 @@ impl<'a> Chain<'a> {
         // Where the chain is cut open the choice is made by a chain that is open there
         // and closes half way round.
         let half = n / 2;
-        let (_, open) = (0..self.stands[half].1.len())
-            .filter_map(|b| self.pass(half, b, false))
-            .min_by(|x, y| x.0.total_cmp(&y.0))
-            .or_else(|| {
-                let starts = 0..self.stands[half].1.len();
-                starts.filter_map(|b| self.pass(half, b, true)).next()
-            })?;
-        let closed = self.pass(0, open[0], true).map(|(_, poses)| poses);
+        let (_, open) = self.pass(half, None, false).or_else(|| {
+            let starts = 0..self.stands[half].1.len();
+            starts.filter_map(|b| self.pass(half, Some(b), true)).next()
+        })?;
+        let closed = self.pass(0, Some(open[0]), true).map(|(_, poses)| poses);
         closed.or_else(|| {
             (0..self.stands[0].1.len())
-                .filter_map(|a| self.pass(0, a, true))
+                .filter_map(|a| self.pass(0, Some(a), true))
                 .min_by(|x, y| x.0.total_cmp(&y.0))
                 .map(|(_, poses)| poses)
         })
     }
 
-    /// The shortest chain that begins at pose `a` of station `first` and goes once
-    /// round: back to the same pose when `closed`, else to any.
-    fn pass(&self, first: usize, a: usize, closed: bool) -> Option<(f64, Vec<usize>)> {
+    /// The shortest chain that begins at pose `a` of station `first`, or at any of its poses, and
+    /// goes once round: back to the same pose when `closed`, else to any. Of chains as short as
+    /// each other that which begins at the first pose, then that which ends there.
+    fn pass(&self, first: usize, a: Option<usize>, closed: bool) -> Option<(f64, Vec<usize>)> {
         let n = self.stands.len();
-        let mut cost = vec![f64::INFINITY; self.stands[first].1.len()];
-        cost[a] = 0.0;
+        let poses = self.stands[first].1.len();
+        let is_start = |pose: usize| a.is_none_or(|a| a == pose);
+        let cost_of = |pose| if is_start(pose) { 0.0 } else { f64::INFINITY };
+        // How far from where each pose is reached.
+        let mut cost: Vec<(f64, usize)> = (0..poses).map(|pose| (cost_of(pose), pose)).collect();
         let mut back: Vec<Vec<usize>> = Vec::with_capacity(n);
         for step in 0..n {
             let i = (first + step) % n;
             let to = self.stands[self.next(i)].1.len();
-            let mut best = vec![(f64::INFINITY, 0); to];
-            for (from, &so_far) in cost.iter().enumerate().filter(|(_, c)| c.is_finite()) {
-                for (b, slot) in best.iter_mut().enumerate() {
-                    let total = so_far + self.leg(i, from, b).cost_m();
-                    if total < slot.0 {
-                        *slot = (total, from);
+            let mut best = vec![(f64::INFINITY, usize::MAX); to];
+            let mut came = vec![0; to];
+            let reached = cost.iter().enumerate().filter(|(_, c)| c.0.is_finite());
+            for (from, &(so_far, start)) in reached {
+                let ways = best.iter_mut().zip(&mut came).zip(self.costs_m(i, from));
+                for ((slot, came), leg_m) in ways {
+                    let total = so_far + leg_m;
+                    if total < slot.0 || total <= slot.0 && start < slot.1 {
+                        (*slot, *came) = ((total, start), from);
                     }
                 }
             }
-            cost = best.iter().map(|b| b.0).collect();
-            back.push(best.into_iter().map(|b| b.1).collect());
+            cost = best;
+            back.push(came);
         }
-        let end = if closed {
-            a
-        } else {
-            (0..cost.len()).min_by(|x, y| cost[*x].total_cmp(&cost[*y]))?
+        let by_cost = |x: &usize, y: &usize| {
+            let (x, y) = (cost[*x], cost[*y]);
+            x.0.total_cmp(&y.0).then(x.1.cmp(&y.1))
         };
+        let end = match a.filter(|_| closed) {
+            Some(a) => a,
+            None => (0..cost.len()).min_by(by_cost)?,
+        };
+        let cost = cost.into_iter().map(|c| c.0).collect::<Vec<f64>>();
         if !cost[end].is_finite() {
             return None;
         }
@@ -202,7 +240,7 @@ impl<'a> Chain<'a> {
                 let leg = self.flown(i, a, b);
                 as_guessed &= leg.cost_m() <= guess_m + 1e-6;
                 let at = a * self.stands[self.next(i)].1.len() + b;
-                self.legs[i][at] = leg;
+                self.legs[i].set(at, leg);
             }
         }
         if !as_guessed {
@@ -250,10 +288,7 @@ impl<'a> Chain<'a> {
     /// back, once.
     fn give_up(&mut self) {
         let n = self.stands.len();
-        let open = |i: &usize| {
-            let ways = self.legs[*i].iter();
-            ways.filter(|l| l.cost_m().is_finite()).count()
-        };
+        let open = |i: &usize| self.legs[*i].open();
         let i = (0..n).min_by_key(open).unwrap_or(0);
         let parted = if open(&i) > 0 { self.parted() } else { None };
         let (out, other) = if let Some(parted) = parted {
@@ -293,7 +328,7 @@ impl<'a> Chain<'a> {
         (0..self.stands.len()).find(|&i| {
             let onward = (0..self.stands[self.next(i)].1.len()).map(|b| {
                 let mut from = reached.iter().enumerate().filter(|(_, is)| **is);
-                from.any(|(a, _)| self.leg(i, a, b).cost_m().is_finite())
+                from.any(|(a, _)| self.costs_m(i, a)[b].is_finite())
             });
             reached = onward.collect();
             !reached.contains(&true)
@@ -315,7 +350,7 @@ impl<'a> Chain<'a> {
         let rank = self.rank[&station];
         let i = self.stands.partition_point(|s| self.rank[&s.0] < rank);
         self.stands.insert(i, (station, stands));
-        self.legs.insert(i, Vec::new());
+        self.legs.insert(i, Legs::default());
         self.routed.insert(i, 0);
         let n = self.stands.len();
         self.renew(i);
