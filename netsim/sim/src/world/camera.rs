@@ -201,6 +201,7 @@ impl<'a> Eye<'a> {
     fn picture_of(&self, pose: Pose, attitude: impl Fn(&Camera) -> Attitude) -> Picture {
         Picture {
             pose,
+            forward: pose.direction(),
             half_m: (self.across_m, self.along_m),
             axes: self
                 .turned
@@ -256,6 +257,8 @@ impl Axes {
 #[derive(Clone, Copy, Debug)]
 pub struct Picture {
     pose: Pose,
+    /// Where it heads, of length 1.
+    forward: Vector,
     /// Half of it from straight above, across and along, metres.
     half_m: (f64, f64),
     /// How it is turned, and from how high it looks; none where it is level.
@@ -268,6 +271,7 @@ impl Picture {
     pub fn level(pose: Pose, half_m: (f64, f64)) -> Self {
         Self {
             pose,
+            forward: pose.direction(),
             half_m,
             axes: None,
         }
@@ -285,8 +289,8 @@ impl Picture {
         let (across_m, along_m) = (share * self.half_m.0, share * self.half_m.1);
         let to = at - self.pose.position();
         let Some((axes, height_m)) = &self.axes else {
-            let forward = self.pose.direction();
-            return forward.dot(&to).abs() <= along_m && forward.perp(&to).abs() <= across_m;
+            let (along, across) = (self.forward.dot(&to), self.forward.perp(&to));
+            return along.abs() <= along_m && across.abs() <= across_m;
         };
         let (a, b) = self.half_m;
         let far_m = RESOLVED * (a * a + b * b + height_m * height_m).sqrt();

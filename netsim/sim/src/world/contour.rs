@@ -9,7 +9,7 @@
 //! and the time alone. Where the contour is is a function of seed and time. Without one there is
 //! no detector, and nothing is drawn.
 
-use super::detector::{Look, is_in_view, is_seen};
+use super::detector::{Look, Sight};
 use super::motion::Kinematic;
 use super::obstacles::{Obstacles, Place};
 use crate::spec::{ContourSpec, FireSpec, RoadSpec};
@@ -108,10 +108,8 @@ impl Contour {
         at_ms: u64,
         obstacles: &Obstacles,
     ) -> Vec<bool> {
-        let places = self.places(at_ms).into_iter();
-        places
-            .map(|p| is_seen(body, ground(p), obstacles))
-            .collect()
+        let (places, sight) = (self.places(at_ms).into_iter(), Sight::of(body));
+        places.map(|p| sight.sees(ground(p), obstacles)).collect()
     }
 
     /// One look of the detector of a UAV.
@@ -127,10 +125,10 @@ impl Contour {
             return ContourLook::new(sided, []);
         }
         let mut look = Look::new(self.seed, uav, now_ms);
-        let line = self.line(now_ms);
+        let (line, sight) = (self.line(now_ms), Sight::of(body));
         let first = look.random.unit();
         let count = walked(&line, LEAST_M, first)
-            .filter(|p| is_in_view(body, *p))
+            .filter(|p| sight.shows(*p))
             .count();
         #[allow(clippy::cast_precision_loss, reason = "some tens")]
         let apart_m = LEAST_M * (count as f64 / (CONTOUR_MAX - 1) as f64).max(1.0);
@@ -139,10 +137,10 @@ impl Contour {
         let mut begins = true;
         // A closed line is begun where it is out of the picture, so that no piece is cut in two.
         let all: Vec<Point> = walked(&line, apart_m, first).collect();
-        let out = all.iter().position(|p| !is_in_view(body, *p));
+        let out = all.iter().position(|p| !sight.shows(*p));
         let turned = if sided { out.unwrap_or(0) } else { 0 };
         for p in all.iter().cycle().skip(turned).take(all.len()) {
-            if !is_seen(body, ground(*p), obstacles) {
+            if !sight.sees(ground(*p), obstacles) {
                 begins = true;
                 continue;
             }

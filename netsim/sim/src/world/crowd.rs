@@ -9,7 +9,7 @@
 //! alone. Where people are is a function of seed and time; they are moved on once a second. Nobody
 //! appears and nobody vanishes. Without a crowd there is no recogniser, and nothing is drawn.
 
-use super::detector::{Look, is_seen};
+use super::detector::{Look, Sight};
 use super::motion::Kinematic;
 use super::obstacles::{Obstacles, Place};
 use crate::spec::{CrowdSpec, Field, GroupSpec};
@@ -293,7 +293,7 @@ impl Crowd {
 fn is_open(body: &Kinematic, corners: &[Point; 4], obstacles: &Obstacles) -> bool {
     let at = Point::from((corners[0].coords + corners[2].coords) / 2.0);
     let place = Place { at, height_m: 1.0 };
-    is_seen(body, place, obstacles)
+    Sight::of(body).sees(place, obstacles)
 }
 
 /// How many of so many are recognised, and who is not there besides.

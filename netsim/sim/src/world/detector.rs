@@ -2,6 +2,7 @@
 //! their camera, places with errors, some missed; drawn from the seed, the UAV and the
 //! time alone, so who asks twice at one time is told the same.
 
+use super::camera::Picture;
 use super::motion::Kinematic;
 use super::obstacles::{Obstacles, Place};
 use crate::pursuit::sensor::{Noise, rooted};
@@ -9,18 +10,34 @@ use skein_flight::tracking::estimate::Detection;
 use skein_geometry::frame::{Point, Vector};
 use skein_geometry::random::{SplitMix64, mix};
 
-/// Whether a place is in the picture of a UAV.
-pub fn is_in_view(body: &Kinematic, at: Point) -> bool {
-    body.picture().shows(at, 1.0)
+/// What a UAV has in its picture, from where.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight {
+    picture: Picture,
+    from: Place,
 }
 
-/// Whether a place is in the picture of a UAV, and nothing stands in between.
-pub fn is_seen(body: &Kinematic, place: Place, obstacles: &Obstacles) -> bool {
-    let from = Place {
-        at: body.position(),
-        height_m: body.height_m(),
-    };
-    is_in_view(body, place.at) && obstacles.sees(from, place)
+impl Sight {
+    /// That of a UAV as it is now.
+    pub fn of(body: &Kinematic) -> Self {
+        Self {
+            picture: body.picture(),
+            from: Place {
+                at: body.position(),
+                height_m: body.height_m(),
+            },
+        }
+    }
+
+    /// Whether a place is in the picture.
+    pub fn shows(&self, at: Point) -> bool {
+        self.picture.shows(at, 1.0)
+    }
+
+    /// Whether a place is in the picture, and nothing stands in between.
+    pub fn sees(&self, place: Place, obstacles: &Obstacles) -> bool {
+        self.shows(place.at) && obstacles.sees(self.from, place)
+    }
 }
 
 /// What is drawn for one look.

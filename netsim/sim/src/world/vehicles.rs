@@ -6,7 +6,7 @@
 //! seed, the UAV and the time alone, so who asks twice at one time is told the same. Without
 //! vehicles there is no detector, and nothing is drawn.
 
-use super::detector::{Look, is_seen};
+use super::detector::{Look, Sight};
 use super::motion::Kinematic;
 use super::obstacles::{Obstacles, Place};
 use crate::check::detections::Truth;
@@ -120,14 +120,8 @@ impl Vehicles {
     /// Whether one of them is in the picture of a UAV, and nothing stands in between.
     #[must_use]
     pub(super) fn is_pictured(&self, nth: usize, body: &Kinematic, obstacles: &Obstacles) -> bool {
-        let Some(v) = self.all.get(nth) else {
-            return false;
-        };
-        let middle = Place {
-            at: v.at,
-            height_m: MIDDLE_M,
-        };
-        is_seen(body, middle, obstacles)
+        let v = self.all.get(nth);
+        v.is_some_and(|v| Sight::of(body).sees(middle(v), obstacles))
     }
 
     /// One look of the detector of a UAV.
@@ -146,10 +140,11 @@ impl Vehicles {
         }
         let (from, height_m) = (body.position(), body.height_m() - MIDDLE_M);
         let mut look = Look::new(self.seed, uav, now_ms);
+        let sight = Sight::of(body);
         let mut seen = Vec::new();
         for (nth, (v, spec)) in self.all.iter().zip(self.specs.iter()).enumerate() {
             let (recognised, off) = look.recognised();
-            if recognised && self.is_pictured(nth, body, obstacles) {
+            if recognised && sight.sees(middle(v), obstacles) {
                 let (at, told) = look.told((from, height_m), v.at, off);
                 let kind = spec.kind_in(look.seed, nth);
                 seen.push(sighted(at, &told, kind));
@@ -195,6 +190,14 @@ impl VehicleSpec {
 fn other_than(this: u8, of: usize, random: &mut SplitMix64) -> u8 {
     let other = 1 + random.below(of - 1);
     u8::try_from((usize::from(this) + other) % of).unwrap_or(this)
+}
+
+/// What is to be seen of a vehicle.
+fn middle(v: &Vehicle) -> Place {
+    Place {
+        at: v.at,
+        height_m: MIDDLE_M,
+    }
 }
 
 fn sighted(at: Point, told: &Detection, kind: u8) -> Sighted {
