@@ -17,7 +17,7 @@ use crate::check::{Findings, Violation};
 use crate::world::{Judge, LayerSeen};
 use serde::{Deserialize, Serialize};
 use skein_link::{RadioCounters, Reason};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Counted up when a field changes its meaning or goes; new fields leave it as it is.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -520,6 +520,18 @@ impl RunReport {
         report
     }
 
+    /// Whether losses left one UAV of several: alone it may search a town for as long as a mission
+    /// takes, and never come upon what drives there.
+    fn is_one_left(&self) -> bool {
+        let is_back = |k: &KillReport| {
+            let mut again = self.restarts.iter();
+            again.any(|r| r.peer == k.peer && r.at_ms > k.at_ms)
+        };
+        let lost = self.kills.iter().filter(|k| !is_back(k));
+        let lost: BTreeSet<u16> = lost.map(|k| k.peer).collect();
+        !lost.is_empty() && self.uavs.len() <= lost.len() + 1
+    }
+
     /// The verdict: every reason for which the run has failed. `failures` are those that
     /// the driver names.
     pub(super) fn judge(&mut self, failures: &[String]) {
@@ -527,7 +539,7 @@ impl RunReport {
         let c = &self.coverage;
         if self.over_ms.is_some() {
             let mut brought = self.tasks.iter().filter_map(|t| t.tracked.as_ref());
-            if brought.any(|t| t.first_ms.is_none()) {
+            if brought.any(|t| t.first_ms.is_none()) && !self.is_one_left() {
                 reasons.push("nobody ever saw what the mission was to follow".to_owned());
             }
         } else if self.found_ms.is_some() {

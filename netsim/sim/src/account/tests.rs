@@ -1,5 +1,6 @@
 //! Stories told to an account as a driver would, and the same run accounted for twice.
 
+use super::report::{KillReport, RestartReport};
 use super::*;
 use crate::fault::{Fault, TimedFault};
 use crate::history::What;
@@ -414,4 +415,44 @@ fn every_field_of_the_report_is_explained() {
         unexplained.is_empty(),
         "docs/report.md lacks {unexplained:?}"
     );
+}
+
+/// Two who search for as long as a mission takes come upon what they are to follow; one alone may
+/// not.
+#[test]
+fn what_nobody_ever_followed_fails_a_run_unless_one_uav_is_left_of_several() {
+    let killed = |peer| KillReport {
+        peer,
+        at_ms: 10_000,
+        ..KillReport::default()
+    };
+    let again = RestartReport {
+        peer: 2,
+        at_ms: 20_000,
+        ..RestartReport::default()
+    };
+    let task = TaskReport {
+        tracked: Some(crate::check::tracks::Tracked::default()),
+        ..TaskReport::default()
+    };
+    for (uavs, lost, restarts, fails) in [
+        (3, &[][..], vec![], true),
+        (3, &[1], vec![], true),
+        (3, &[1, 2], vec![], false),
+        (3, &[1, 2], vec![again], true),
+        (1, &[], vec![], true),
+    ] {
+        let mut report = RunReport {
+            uavs: (1..=uavs).collect(),
+            over_ms: Some(600_000),
+            kills: lost.iter().map(|peer| killed(*peer)).collect(),
+            restarts,
+            tasks: vec![task.clone()],
+            finished: vec![3],
+            ..RunReport::default()
+        };
+        report.judge(&[]);
+        let told = report.reasons.iter().any(|r| r.contains("ever saw"));
+        assert_eq!(told, fails, "{uavs} {lost:?} {:?}", report.reasons);
+    }
 }
