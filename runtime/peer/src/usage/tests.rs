@@ -149,7 +149,7 @@ fn tracks_that_have_just_begun_tell_no_higher_speed() {
         let mean_mps = told_mps.sum::<f64>() / 4.0;
         let off_mps = mean_mps - drive_mps;
         // All tracks alike would tell 0.36 m/s more at 3 m/s.
-        assert!(off_mps.abs() < 0.03 * drive_mps + 0.1, "{off_mps}");
+        assert!(off_mps.abs() < 0.04 * drive_mps + 0.1, "{off_mps}");
     }
 }
 
