@@ -431,6 +431,7 @@ mod tests {
         found: Findings,
         stability: Stability,
         loss: u16,
+        diameter: u32,
         /// Who believes all others down.
         alone: Option<u16>,
         /// What everybody but that one believes of others besides.
@@ -445,6 +446,7 @@ mod tests {
                 found: Findings::new(1),
                 stability: Stability::default(),
                 loss,
+                diameter: 1,
                 alone: None,
                 others: Vec::new(),
             }
@@ -490,7 +492,10 @@ mod tests {
             let snapshot = Snapshot {
                 now_ms,
                 loss_permille: self.loss,
-                bounds: BOUNDS,
+                bounds: Bounds {
+                    diameter: self.diameter.into(),
+                    ..BOUNDS
+                },
                 graph: &graph,
                 stability: &self.stability,
                 handicaps: &Handicaps::default(),
@@ -500,6 +505,20 @@ mod tests {
             };
             self.check
                 .on_snapshot(&snapshot, &self.members, &mut self.found);
+        }
+    }
+
+    /// Within two hops the bound is 16 s, and twice that as bids collide.
+    #[test]
+    fn over_several_hops_a_cell_is_without_an_owner_for_twice_the_bound_at_most() {
+        for (loss, diameter, breaks_s) in [(0, 1, 13), (0, 2, 33), (50, 2, 33)] {
+            let mut s = Story::new(loss);
+            s.diameter = diameter;
+            let breaks = (0..90).find(|t| {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
+                s.found.counts.contains_key("L2")
+            });
+            assert_eq!(breaks, Some(breaks_s), "loss {loss}, D = {diameter}");
         }
     }
 
