@@ -114,6 +114,20 @@ impl Scene {
         }
     }
 
+    /// One of two was told this of the sector by now, and the other that.
+    fn snapshot(&mut self, story: &mut Story, second: u64, one: Sector, other: Option<Sector>) {
+        let knows = |told: Option<Sector>| skein_peer::Beliefs {
+            crowd: told.map(|s| (SECTOR, s)).into_iter().collect(),
+            ..speaking()
+        };
+        let views = [(1, knows(Some(one))), (2, knows(other))];
+        story.snapshot(1_000 * second, &views, |snapshot| {
+            let flight = FlightCheck::new(BTreeMap::new(), Vec::new(), 10.0);
+            let flyers = (&BTreeMap::new(), &flight);
+            self.check.on_snapshot(snapshot, flyers, &mut self.found);
+        });
+    }
+
     fn broken(&self) -> Vec<&'static str> {
         self.found.counts.keys().copied().collect()
     }
@@ -284,24 +298,10 @@ fn who_lacks_for_long_what_its_component_was_told_is_found() {
     let mut scene = Scene::new(100);
     let says = scene.sector(30, false);
     let mut story = Story::new(0);
-    let knows = |sectors: Vec<(u16, Sector)>| skein_peer::Beliefs {
-        crowd: sectors,
-        ..speaking()
-    };
     scene.check.revision = 1;
     let run = |scene: &mut Scene, story: &mut Story, from_s: u64, to_s: u64, second: bool| {
         for s in from_s..to_s {
-            let other = if second {
-                vec![(SECTOR, says)]
-            } else {
-                Vec::new()
-            };
-            let views = [(1, knows(vec![(SECTOR, says)])), (2, knows(other))];
-            story.snapshot(1_000 * s, &views, |snapshot| {
-                let flight = FlightCheck::new(BTreeMap::new(), Vec::new(), 10.0);
-                let flyers = (&BTreeMap::new(), &flight);
-                scene.check.on_snapshot(snapshot, flyers, &mut scene.found);
-            });
+            scene.snapshot(story, s, says, second.then_some(says));
         }
     };
     run(&mut scene, &mut story, 0, 150, false);
@@ -325,19 +325,7 @@ fn whether_a_sector_is_too_dense_has_a_clock_of_its_own() {
         let mut story = Story::new(0);
         (0..400).find(|s| {
             let told = if *s < dense_from_s { says } else { dense };
-            let views = [(1, vec![(SECTOR, told)]), (2, Vec::new())];
-            let views = views.map(|(id, crowd)| {
-                let view = skein_peer::Beliefs {
-                    crowd,
-                    ..speaking()
-                };
-                (id, view)
-            });
-            story.snapshot(1_000 * s, &views, |snapshot| {
-                let flight = FlightCheck::new(BTreeMap::new(), Vec::new(), 10.0);
-                let flyers = (&BTreeMap::new(), &flight);
-                scene.check.on_snapshot(snapshot, flyers, &mut scene.found);
-            });
+            scene.snapshot(&mut story, *s, told, None);
             !scene.broken().is_empty()
         })
     };
