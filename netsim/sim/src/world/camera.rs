@@ -199,13 +199,14 @@ impl<'a> Eye<'a> {
     }
 
     fn picture_of(&self, pose: Pose, attitude: impl Fn(&Camera) -> Attitude) -> Picture {
+        let forward = pose.direction();
         Picture {
             pose,
-            forward: pose.direction(),
+            forward,
             half_m: (self.across_m, self.along_m),
             axes: self
                 .turned
-                .map(|(camera, height_m)| (Axes::of(&pose, &attitude(camera)), height_m)),
+                .map(|(camera, height_m)| (Axes::of(forward, &attitude(camera)), height_m)),
         }
     }
 }
@@ -219,11 +220,10 @@ struct Axes {
 }
 
 impl Axes {
-    fn of(pose: &Pose, a: &Attitude) -> Self {
-        let (s, c) = sin_cos(pose.heading_rad);
+    fn of(ahead: Vector, a: &Attitude) -> Self {
         let level = Self {
-            forward: Vector3::new(c, s, 0.0),
-            left: Vector3::new(-s, c, 0.0),
+            forward: Vector3::new(ahead.x, ahead.y, 0.0),
+            left: Vector3::new(-ahead.y, ahead.x, 0.0),
             down: -Vector3::z(),
         };
         level
