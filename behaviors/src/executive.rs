@@ -221,6 +221,8 @@ pub struct Executive {
     height_m: f64,
     envelope: Envelope,
     aim: Aim,
+    /// Cells will be given to it soon.
+    expects_cells: bool,
     /// Cells to be served after those on the track.
     queue: VecDeque<CellVisit>,
     /// What was planned before and is to be flown.
@@ -278,6 +280,7 @@ impl Executive {
             height_m,
             envelope,
             aim: Aim::Hold,
+            expects_cells: false,
             queue: VecDeque::new(),
             given: None,
             track: Track::default(),

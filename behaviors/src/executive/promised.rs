@@ -387,7 +387,8 @@ impl Executive {
     #[must_use]
     pub fn wants_more(&self, at_ms: u64) -> bool {
         if self.stands() {
-            return self.aim == Aim::Legs && !self.queue.is_empty();
+            let has_cells = self.aim == Aim::Legs && !self.queue.is_empty();
+            return has_cells || self.clears_launcher();
         }
         // On the ground there is no place yet from which to turn off.
         let begun = |c: &&Contingency| c.schedule.is_some_and(|(_, from_ms)| from_ms <= at_ms);

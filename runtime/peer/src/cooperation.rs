@@ -254,10 +254,12 @@ impl Cooperation {
             return Effects::new();
         };
         let aims_anew = self.tasking.look(now, percept, state);
+        let expects_cells = state.expects_cells();
         let sections = &state.negotiation.sections;
         let Some(executive) = &mut state.executive else {
             return Effects::new();
         };
+        executive.expect_cells(expects_cells);
         let is_open = |c: u16| !sections.covered().contains(c);
         let (mut setpoint, events) = executive.step(percept, &is_open);
         self.trails.note(self.id, executive.take_traced());

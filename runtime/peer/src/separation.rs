@@ -8,9 +8,10 @@
 //! |---|---|
 //! | a percept of a UAV that is not where it was to be | a circle from there is imposed, and said |
 //! | it stands ready to be launched | nothing is in force; its first flight is asked for, where none is clear for long by pleading |
+//! | another asks for its first flight from its launcher | what this UAV flies is said whole: while it waited the other took note of nobody |
 //! | what was offered is agreed | it is flown |
 //! | the goal does not lead where the offer does | the offer is withdrawn |
-//! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after a second, and where none does for long, and who is in the way circles, one is offered to show it |
+//! | what is in force is nearly flown, or is not wanted any more | the first extension that keeps clear is offered; where none does, that is looked at again after half a second, and where none does for long, and who is in the way circles, one is offered to show it |
 //! | one who goes before is held up by this UAV, which gets no further itself, or anybody by one with nothing to do | a way aside is offered that lets them pass |
 //! | another UAV is believed down, for so long that it would have circled, and not sensed where it promised to be | what it promised is in nobody's way |
 //! | one who says nothing is sensed, and does not circle | nothing near it is agreed (`silence`) |
@@ -19,6 +20,8 @@
 mod held_up;
 mod passing;
 mod silence;
+#[cfg(test)]
+mod tests;
 
 use crate::effect::{Effect, Effects};
 use crate::input::Time;
@@ -41,7 +44,7 @@ use std::collections::BTreeMap;
 const GUARD_MS: u64 = 400;
 
 /// After a search that found nothing the next one waits for so long, milliseconds.
-const SEARCH_AGAIN_MS: u64 = 1_000;
+const SEARCH_AGAIN_MS: u64 = 500;
 
 /// The same of who stands on a launcher, milliseconds. Others wait behind it; and it asks for a
 /// take-off half as far ahead as for a turn in flight: what comes of no answer in time is another
@@ -97,6 +100,8 @@ pub(crate) struct Separation {
     is_news: bool,
     /// What is in force nobody has been told yet.
     is_imposed: bool,
+    /// Somebody asks to take off, who knows of nobody what it flies.
+    is_asked: bool,
     said_ms: u64,
     /// When its motions were said last, and which proposal that was.
     said_whole: (u64, Option<u32>),
@@ -125,6 +130,7 @@ impl Separation {
             search_from_ms: 0,
             is_news: false,
             is_imposed: false,
+            is_asked: false,
             said_ms: 0,
             said_whole: (0, None),
             clocks: (Time(0), 0),
@@ -392,7 +398,8 @@ impl Separation {
             SAY_MS
         };
         let offers_anew = brief.proposal.is_some() && brief.proposal != self.said_whole.1;
-        let is_whole = offers_anew || self.is_imposed || whole_ms >= again_ms;
+        let is_told = !self.is_imposed && !self.is_asked;
+        let is_whole = offers_anew || !is_told || whole_ms >= again_ms;
         let since_ms = now_ms.saturating_sub(self.said_ms);
         if since_ms < SAY_LEAST_MS || !(self.is_news || is_whole) {
             return Effects::new();
@@ -403,6 +410,7 @@ impl Separation {
             return vec![Effect::SayNow(Body::Conflict(brief))];
         }
         self.is_imposed = false;
+        self.is_asked = false;
         self.said_whole = (now_ms, brief.proposal);
         vec![Effect::SayNow(Body::Intent(conflicts.intent()))]
     }
@@ -420,6 +428,7 @@ impl Separation {
         let conflicts = self.of_present_life(now, author);
         let news = conflicts.is_some_and(|c| c.hear(PeerId(author.id), intent, now_ms));
         self.is_news |= news;
+        self.is_asked |= intent.asks_to_take_off() && self.promised(now_ms).is_some();
     }
 
     /// The same in brief.

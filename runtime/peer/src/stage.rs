@@ -235,6 +235,13 @@ impl MissionState {
         !self.negotiation.sections.unassigned().is_empty()
     }
 
+    /// Whether it waits for the first division, in which it takes part.
+    pub fn expects_cells(&self) -> bool {
+        let state = self.stage.state();
+        let takes_part = (state.goal, state.part) == (StateGoal::Hold, Part::Takes);
+        takes_part && self.negotiation.is_undivided()
+    }
+
     /// Where the peer flies in its state.
     pub fn goal_of_state(&self) -> Goal {
         let sections = &self.negotiation.sections;

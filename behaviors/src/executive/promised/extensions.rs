@@ -33,6 +33,10 @@ const ASIDE_CIRCLES: [f64; 3] = [2.0, 3.5, 6.0];
 /// In so many directions.
 const ASIDE_COURSES: u32 = 8;
 
+/// Where a UAV flies that takes off before it has cells to see: straight on, else to a side, in
+/// eighths of a turn from where it heads.
+const OUT_COURSES: [f64; 5] = [0.0, 1.0, -1.0, 2.0, -2.0];
+
 impl Executive {
     /// Flights that could follow on what is in force, turning off at least `lead_ms` after a
     /// time, the best first. Cells that cannot be reached from anywhere on its circle are given
@@ -45,6 +49,10 @@ impl Executive {
     ) -> Vec<Extension> {
         let (mut ways, mut unreached) = (Vec::new(), Vec::new());
         for (cut_m, cut) in self.cuts(at_ms, lead_ms) {
+            if self.clears_launcher() {
+                ways.extend(self.ways_out(cut_m, cut));
+                continue;
+            }
             let mut events = Vec::new();
             ways.push(self.way(cut_m, cut, is_open, &mut events));
             unreached.push(Unreached::of(&events));
@@ -93,15 +101,11 @@ impl Executive {
             return Vec::new();
         };
         let mut ways: Vec<Curve> = Vec::new();
-        let ahead = cut.pose.direction();
         for circles in ASIDE_CIRCLES {
             for k in 0..ASIDE_COURSES {
                 let turn = TAU * f64::from(k) / f64::from(ASIDE_COURSES);
-                let (s, c) = sin_cos(turn);
-                let d = Vector::new(ahead.x * c - ahead.y * s, ahead.x * s + ahead.y * c);
-                let to = cut.pose.position() + d * (circles * 2.0 * self.circle_radius_m());
-                let there = Pose::new(to, cut.pose.heading_rad + turn);
-                ways.extend(self.transit.router.route(cut.pose, there).ok());
+                let so_far_m = circles * 2.0 * self.circle_radius_m();
+                ways.extend(self.way_off(cut.pose, turn, so_far_m));
             }
         }
         ways.sort_by(|a, b| a.length_m().total_cmp(&b.length_m()));
@@ -117,6 +121,35 @@ impl Executive {
             self.offer_part(&way, 1, at_ms, &mut offered);
         }
         offered
+    }
+
+    /// Ways off a launcher that lead nowhere yet, those straight on first.
+    fn ways_out(&self, cut_m: f64, cut: Place) -> Vec<Way> {
+        let so_far_m = PROMISED_S * self.speed_mps();
+        let off = |eighths: f64| self.way_off(cut.pose, eighths * TAU / 8.0, so_far_m);
+        let way = |curve: Curve| {
+            let mut way = Way {
+                cut_m,
+                cut,
+                moves: Vec::new(),
+                idle_m: curve.length_m(),
+                arrives: None,
+            };
+            way.push(Move::Route(curve));
+            way
+        };
+        OUT_COURSES.into_iter().filter_map(off).map(way).collect()
+    }
+
+    /// The way to a place so far off, metres, that is reached on the same course when it turns by
+    /// an angle first.
+    fn way_off(&self, from: Pose, turn_rad: f64, so_far_m: f64) -> Option<Curve> {
+        let (s, c) = sin_cos(turn_rad);
+        let ahead = from.direction();
+        let d = Vector::new(ahead.x * c - ahead.y * s, ahead.x * s + ahead.y * c);
+        let to = from.position() + d * so_far_m;
+        let there = Pose::new(to, from.heading_rad + turn_rad);
+        self.transit.router.route(from, there).ok()
     }
 
     /// Where it could turn off: after what is still wanted; else as soon as can be, and

@@ -7,12 +7,12 @@
 //! | state | percept | what the airframe is told |
 //! |---|---|---|
 //! | waits in line | not ready | nothing |
-//! | stands | ready, with cells to see | that it wants to take off |
+//! | stands | ready, with cells to see, or to be given some soon | that it wants to take off |
 //! | stands | ready, with nothing to do, or no way is clear | that another may go before it |
 //! | agreed | before its time | when it takes off |
 //! | agreed | its time is past, it is on the ground still | as in the line: it asks anew |
 
-use super::super::Executive;
+use super::super::{Aim, Executive};
 use super::Contingency;
 use crate::percept::Percept;
 use crate::setpoint::Launch;
@@ -23,6 +23,17 @@ impl Executive {
     #[must_use]
     pub fn stands(&self) -> bool {
         self.standing_at().is_some()
+    }
+
+    /// Says whether cells will be given to it soon. On a launcher it takes off before that, and
+    /// waits near by: the place is clear for the next one sooner.
+    pub fn expect_cells(&mut self, expects: bool) {
+        self.expects_cells = expects;
+    }
+
+    /// Whether it stands, and wants to be off for whatever it will be given.
+    pub(super) fn clears_launcher(&self) -> bool {
+        self.expects_cells && self.aim == Aim::Hold && self.stands()
     }
 
     /// Where.

@@ -363,6 +363,40 @@ fn who_has_nothing_to_fly_for_or_is_held_up_lets_others_go_before() {
     );
 }
 
+/// What nobody has given it yet it need not wait for on its launcher.
+#[test]
+fn who_is_to_be_given_cells_takes_off_before_and_turns_to_them_in_the_air() {
+    let mut flight = Flight::new(true);
+    let (n, is_open) = (flight.open.len(), |_: u16| true);
+    let percept = on_launcher(&flight, 1_000);
+    let said = |f: &mut Flight| f.executive.step(&percept, &is_open).0.launch;
+    flight.executive.set_goal(Goal::Hold, &is_open);
+    assert_eq!(said(&mut flight), Launch::Stay);
+    assert!(!flight.executive.wants_more(1_000));
+    flight.executive.expect_cells(true);
+    assert_eq!(said(&mut flight), Launch::Wish);
+    let ways = flight.executive.extensions(1_000, LEAD_MS, &is_open);
+    // Straight on first, and to both sides.
+    let side = |e: &Extension| {
+        let motion = Motion::new(e.plan.clone()).unwrap();
+        let flown_ms = (motion.ends_at_s() * 1e3) as u64;
+        let way = motion.pose_at(flown_ms).position() - percept.pose.position();
+        percept.pose.direction().perp(&way) / way.norm()
+    };
+    assert!(side(&ways[0]).abs() < 0.01, "{}", side(&ways[0]));
+    assert!(ways.iter().any(|e| side(e) > 0.5) && ways.iter().any(|e| side(e) < -0.5));
+    let at_ms = launched(&mut flight, 1_000, true);
+    flight.wing.time_ms = at_ms;
+    flight.fly(3);
+    assert_eq!(flight.imposed, 0);
+    // It comes to where it waits, with nothing to ask for; then it turns off at once.
+    assert!(!flight.executive.wants_more(flight.wing.time_ms));
+    flight.legs(0, u16::try_from(n).unwrap());
+    assert!(flight.executive.wants_more(flight.wing.time_ms));
+    flight.fly(1_500);
+    assert!(flight.done && flight.imposed == 0);
+}
+
 #[test]
 fn another_goal_is_taken_up_when_that_is_agreed() {
     let mut flight = Flight::new(true);

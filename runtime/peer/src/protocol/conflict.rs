@@ -10,6 +10,7 @@
 //! | idle | a wish, and a way that is clear | proposing | the proposal is said |
 //! | idle | a wish, and no such way | idle | the search is repeated after a second |
 //! | proposing | agreed before the branch | on its way | the way is flown |
+//! | proposing | agreed with others | on its way | the next branch is put off half as far again as that took, within bounds |
 //! | proposing | the branch is passed | idle | the next branch is put off half as far again, unless it pleaded |
 //! | proposing | gave way | idle | another way is looked for at once |
 //! | on its way | every 5 s: a way that costs a second less | proposing | the proposal is said |
@@ -27,9 +28,13 @@ use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::seconds;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How far ahead of now a proposal turns off at first, milliseconds: what one exchange takes
+/// How far ahead of now a proposal turns off at first, and at least, milliseconds: where nothing
+/// is late or lost an exchange takes a third of that.
+const LEAD_FIRST_MS: u64 = 1_000;
+
+/// The most that is kept of it once a proposal was agreed, milliseconds: what one exchange takes
 /// when each of its messages is half a second late and one of them has to be repeated.
-const LEAD_FIRST_MS: u64 = 2_000;
+const LEAD_KEPT_MS: u64 = 2_000;
 
 /// The farthest it is put off when answers do not come, milliseconds: with a third of all
 /// messages lost, thirty others have answered within that time nearly always.
@@ -73,6 +78,16 @@ pub struct Intent {
     pub proposal: Option<PromisedPlan>,
     /// Which version of whom is accepted, while that is on offer, ascending by peer.
     pub accepts: Vec<(PeerId, u32)>,
+}
+
+impl Intent {
+    /// Whether its author is on the ground, and asks for a flight from there.
+    #[must_use]
+    pub fn asks_to_take_off(&self) -> bool {
+        let flown = &self.in_force.plan;
+        let stands = flown.stretches.is_empty() && flown.end == End::Leaves;
+        self.proposal.is_some() && stands
+    }
 }
 
 /// Where a UAV wants to go.
@@ -152,6 +167,8 @@ pub struct Conflicts {
     on_way: bool,
     /// When the proposal leaves the motion in force; of no meaning without one.
     branch_ms: u64,
+    /// When it was put on offer.
+    offered_ms: u64,
     lead_ms: u64,
     search_from_ms: u64,
     /// Where the others were seen last, whether or not they said what they fly.
@@ -170,6 +187,7 @@ impl Conflicts {
             wish: None,
             on_way: false,
             branch_ms: 0,
+            offered_ms: 0,
             lead_ms: LEAD_FIRST_MS,
             search_from_ms: 0,
             seen: BTreeMap::new(),
@@ -335,6 +353,7 @@ impl Conflicts {
                     suits(&motion).then_some((nth, until_ms, motion))
                 })?;
         self.branch_ms = until_ms;
+        self.offered_ms = now_ms;
         self.promises.propose(motion);
         Some(nth)
     }
@@ -353,6 +372,7 @@ impl Conflicts {
         };
         let (nth, until_ms, motion) = motions.into_iter().enumerate().find_map(possible)?;
         self.branch_ms = until_ms;
+        self.offered_ms = now_ms;
         self.promises.plead(motion);
         Some(nth)
     }
@@ -459,7 +479,14 @@ impl Conflicts {
         }
         if settled.adopted {
             self.on_way = true;
-            self.lead_ms = LEAD_FIRST_MS;
+            let took_ms = now_ms.saturating_sub(self.offered_ms);
+            // Where nobody was asked nothing is known of how late answers are.
+            let least_ms = if took_ms > 0 {
+                took_ms * 3 / 2
+            } else {
+                self.lead_ms
+            };
+            self.lead_ms = least_ms.clamp(LEAD_FIRST_MS, LEAD_KEPT_MS);
             self.search_from_ms = now_ms + IMPROVE_MS;
         }
         settled
@@ -499,6 +526,7 @@ impl Conflicts {
             return false;
         };
         self.branch_ms = branch_ms;
+        self.offered_ms = now_ms;
         self.promises.propose(motion);
         // Where nobody has to be asked it is agreed already.
         let _ = self.settle(now_ms);
@@ -647,6 +675,45 @@ mod tests {
         assert!(b.in_force().ends_at_s() > 50.0);
         let nearest = first_loss_s(a.in_force(), b.in_force(), 300, 54.0);
         assert_eq!(nearest, None);
+    }
+
+    /// How far ahead the first of two turns off whose answers come after this time, milliseconds.
+    fn lead_after_ms(took_ms: u64) -> u64 {
+        let (mut a, mut b) = head_on();
+        b.wish(None);
+        // Far enough ahead that there is time for the answer.
+        a.lead_ms = LEAD_MOST_MS;
+        assert!(a.tick(0) && b.hear(PeerId(1), &a.intent(), 0));
+        assert!(a.hear(PeerId(2), &b.intent(), took_ms));
+        assert!(!a.is_proposing() && a.in_force().ends_at_s() > 50.0);
+        a.lead_ms()
+    }
+
+    #[test]
+    fn who_was_answered_soon_turns_off_sooner_next_time() {
+        assert_eq!(lead_after_ms(200), LEAD_FIRST_MS);
+        assert_eq!(lead_after_ms(1_000), 1_500);
+        assert_eq!(lead_after_ms(3_000), LEAD_KEPT_MS);
+        // Where nobody is asked nothing is learnt of answers.
+        let mut alone = uav(1, -600, 0, Point::new(600.0, 0.0));
+        alone.lead_ms = 1_500;
+        assert!(alone.tick(0) && !alone.is_proposing());
+        assert_eq!(alone.lead_ms(), 1_500);
+        // Without an answer it is put off.
+        let (mut a, _) = head_on();
+        assert!(a.tick(0) && !a.tick(LEAD_FIRST_MS));
+        assert!(a.tick(LEAD_FIRST_MS + 1));
+        assert_eq!(a.lead_ms(), LEAD_FIRST_MS * 3 / 2);
+    }
+
+    #[test]
+    fn who_asks_to_take_off_is_told_from_who_flies_or_asks_nothing() {
+        let (mut g, plan) = on_ground(3, 0, 3_000);
+        assert!(!g.intent().asks_to_take_off());
+        assert_eq!(g.offer(200, [(&plan, 2_400)], None), Some(0));
+        assert!(g.intent().asks_to_take_off());
+        let (mut a, _) = head_on();
+        assert!(a.tick(0) && a.is_proposing() && !a.intent().asks_to_take_off());
     }
 
     #[test]

@@ -450,6 +450,11 @@ impl Negotiation {
         };
     }
 
+    /// Whether nothing was divided yet, and it has nothing to fly before that.
+    pub fn is_undivided(&self) -> bool {
+        self.undivided_since.is_some()
+    }
+
     fn rank(&self, ctx: &Context<'_>) -> u64 {
         ctx.members.iter().take_while(|m| m.id != self.me).count() as u64
     }

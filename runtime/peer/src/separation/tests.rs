@@ -1,0 +1,106 @@
+//! What one UAV says to others that it flies.
+
+use super::*;
+use crate::testing::airframe;
+use skein_flight::separation::{End, Stretch};
+use skein_geometry::frame::Pose;
+
+fn me(id: u16) -> Member {
+    Member { id, incarnation: 1 }
+}
+
+fn straight_on(from_ms: u64) -> MotionPlan {
+    MotionPlan {
+        start_ms: from_ms,
+        east_mm: 0,
+        north_mm: 0,
+        heading_e7: 0,
+        stretches: vec![Stretch {
+            radius_mm: 0,
+            length_mm: 300_000,
+            airspeed_mmps: 15_000,
+        }],
+        end: End::Loiter {
+            radius_mm: 60_000,
+            airspeed_mmps: 15_000,
+        },
+    }
+}
+
+fn conflicts(id: u16, flown: MotionPlan) -> Conflicts {
+    let airframe = airframe();
+    let apart = Apart {
+        detours: Detours {
+            airframe,
+            separation_m: 30.0,
+        },
+        tubes_m: 4.0,
+        circle_radius_m: 60.0,
+        reach: None,
+    };
+    Conflicts::new(PeerId(id), 0, apart, Motion::new(flown).unwrap())
+}
+
+/// One that flies this, and has just said so.
+fn flies(flown: MotionPlan) -> Separation {
+    let rules = Rules {
+        separation_m: 30.0,
+        tubes_m: 4.0,
+        fastest_mps: 15.0,
+        turn_radius_m: 50.0,
+    };
+    let mut separation = Separation::new(me(1), rules, airframe());
+    separation.conflicts = Some(conflicts(1, flown));
+    separation.clocks = (Time(0), 10_000);
+    let _ = separation.speak(10_000);
+    assert!(separation.speak(10_400).is_empty(), "nothing is new");
+    separation
+}
+
+/// What it says once it heard that another offers a flight: whether with all that it flies.
+fn says_whole(separation: &mut Separation, other: &Conflicts) -> Option<bool> {
+    let record = Record {
+        author: 2,
+        incarnation: 1,
+        seq: 1,
+        kind: 10,
+        subject: 0,
+        body: Vec::new(),
+        signature: Vec::new(),
+    };
+    separation.hear(Time(500), (&record, 0), &other.intent());
+    match &separation.speak(10_600)[..] {
+        [] => None,
+        [Effect::SayNow(Body::Intent(_))] => Some(true),
+        [Effect::SayNow(Body::Conflict(_))] => Some(false),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn who_asks_to_take_off_is_told_all_that_is_flown_there() {
+    let far = |from_ms| MotionPlan {
+        north_mm: 900_000,
+        ..straight_on(from_ms)
+    };
+    let at_ms = 13_000;
+    let ground = MotionPlan::on_ground(10_000, Pose::new(Default::default(), 0.0));
+    let mut stands = conflicts(2, ground.clone());
+    assert_eq!(stands.offer(10_400, [(&far(at_ms), 12_600)], None), Some(0));
+    assert_eq!(
+        says_whole(&mut flies(straight_on(9_000)), &stands),
+        Some(true)
+    );
+    // Another one on the ground is in nobody's way.
+    assert_ne!(says_whole(&mut flies(ground), &stands), Some(true));
+    // Who flies hears every five seconds what others do.
+    let mut in_air = conflicts(2, far(9_000));
+    assert_eq!(
+        in_air.offer(10_400, [(&far(10_400), 12_600)], None),
+        Some(0)
+    );
+    assert_eq!(
+        says_whole(&mut flies(straight_on(9_000)), &in_air),
+        Some(false)
+    );
+}
