@@ -299,7 +299,8 @@ impl Separation {
         )]
         let endurance_s = percept.endurance_s.max(0.0) as u32;
         let before = self.me.incarnation.saturating_mul(VERSIONS_OF_A_LIFE);
-        Conflicts::new(PeerId(self.me.id), endurance_s, apart, motion).after(before)
+        let begun = Conflicts::new(PeerId(self.me.id), endurance_s, apart, motion);
+        begun.after(before).answered_soon()
     }
 
     /// Has the executive fly what was agreed.

@@ -10,7 +10,7 @@
 //! | idle | a wish, and a way that is clear | proposing | the proposal is said |
 //! | idle | a wish, and no such way | idle | the search is repeated after a second |
 //! | proposing | agreed before the branch | on its way | the way is flown |
-//! | proposing | agreed with others | on its way | the next branch is put off half as far again as that took, within bounds |
+//! | proposing | agreed with others | on its way | the next branch is put off twice as far as that took, 1 s at least and 2 s at most |
 //! | proposing | the branch is passed | idle | the next branch is put off half as far again, unless it pleaded |
 //! | proposing | gave way | idle | another way is looked for at once |
 //! | on its way | every 5 s: a way that costs a second less | proposing | the proposal is said |
@@ -28,13 +28,13 @@ use skein_geometry::frame::{Point, Pose};
 use skein_geometry::math::seconds;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How far ahead of now a proposal turns off at first, and at least, milliseconds: where nothing
-/// is late or lost an exchange takes a third of that.
-const LEAD_FIRST_MS: u64 = 1_000;
+/// How far ahead of now a proposal turns off at first, and at most once one was agreed,
+/// milliseconds: what one exchange takes when each of its messages is half a second late and one
+/// of them has to be repeated.
+const LEAD_FIRST_MS: u64 = 2_000;
 
-/// The most that is kept of it once a proposal was agreed, milliseconds: what one exchange takes
-/// when each of its messages is half a second late and one of them has to be repeated.
-const LEAD_KEPT_MS: u64 = 2_000;
+/// And at least, milliseconds: where nothing is late or lost an exchange takes a third of that.
+const LEAD_LEAST_MS: u64 = 1_000;
 
 /// The farthest it is put off when answers do not come, milliseconds: with a third of all
 /// messages lost, thirty others have answered within that time nearly always.
@@ -200,6 +200,14 @@ impl Conflicts {
     pub fn after(mut self, before: u32) -> Self {
         let (rank, flown) = (self.promises.rank(), self.promises.in_force().clone());
         self.promises = Promises::after(before, rank, flown);
+        self
+    }
+
+    /// The same that takes others for near at first: a proposal that comes to nothing costs it
+    /// less than a later turn.
+    #[must_use]
+    pub fn answered_soon(mut self) -> Self {
+        self.lead_ms = LEAD_LEAST_MS;
         self
     }
 
@@ -482,11 +490,11 @@ impl Conflicts {
             let took_ms = now_ms.saturating_sub(self.offered_ms);
             // Where nobody was asked nothing is known of how late answers are.
             let least_ms = if took_ms > 0 {
-                took_ms * 3 / 2
+                2 * took_ms
             } else {
                 self.lead_ms
             };
-            self.lead_ms = least_ms.clamp(LEAD_FIRST_MS, LEAD_KEPT_MS);
+            self.lead_ms = least_ms.clamp(LEAD_LEAST_MS, LEAD_FIRST_MS);
             self.search_from_ms = now_ms + IMPROVE_MS;
         }
         settled
@@ -691,9 +699,9 @@ mod tests {
 
     #[test]
     fn who_was_answered_soon_turns_off_sooner_next_time() {
-        assert_eq!(lead_after_ms(200), LEAD_FIRST_MS);
-        assert_eq!(lead_after_ms(1_000), 1_500);
-        assert_eq!(lead_after_ms(3_000), LEAD_KEPT_MS);
+        assert_eq!(lead_after_ms(200), LEAD_LEAST_MS);
+        assert_eq!(lead_after_ms(700), 1_400);
+        assert_eq!(lead_after_ms(3_000), LEAD_FIRST_MS);
         // Where nobody is asked nothing is learnt of answers.
         let mut alone = uav(1, -600, 0, Point::new(600.0, 0.0));
         alone.lead_ms = 1_500;
@@ -701,6 +709,7 @@ mod tests {
         assert_eq!(alone.lead_ms(), 1_500);
         // Without an answer it is put off.
         let (mut a, _) = head_on();
+        assert_eq!(a.clone().answered_soon().lead_ms(), LEAD_LEAST_MS);
         assert!(a.tick(0) && !a.tick(LEAD_FIRST_MS));
         assert!(a.tick(LEAD_FIRST_MS + 1));
         assert_eq!(a.lead_ms(), LEAD_FIRST_MS * 3 / 2);
