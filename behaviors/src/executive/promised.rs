@@ -8,7 +8,7 @@
 //!
 //! | what happens | what is flown | what is wanted |
 //! |---|---|---|
-//! | it stands ready to be launched | nothing | to take off on the way to its first cell |
+//! | it stands ready to be launched | nothing | to take off on the way to its first cell, or off the place where cells are still to be given |
 //! | first percept in the air without that, or off the track | a circle from here, imposed on others | all that the goal asks for |
 //! | an extension is agreed | it, then its circle | what follows it |
 //! | another goal | as before | to turn off as soon as can be, but after what both goals share |

@@ -110,11 +110,8 @@ impl Executive {
         }
         ways.sort_by(|a, b| a.length_m().total_cmp(&b.length_m()));
         let way = |curve: Curve| Way {
-            cut_m,
-            cut,
             moves: vec![Move::Route(curve)],
-            idle_m: 0.0,
-            arrives: None,
+            ..Way::new(cut_m, cut)
         };
         let mut offered = Vec::new();
         for way in ways.into_iter().map(way) {
@@ -129,11 +126,8 @@ impl Executive {
         let off = |eighths: f64| self.way_off(cut.pose, eighths * TAU / 8.0, so_far_m);
         let way = |curve: Curve| {
             let mut way = Way {
-                cut_m,
-                cut,
-                moves: Vec::new(),
                 idle_m: curve.length_m(),
-                arrives: None,
+                ..Way::new(cut_m, cut)
             };
             way.push(Move::Route(curve));
             way
@@ -192,13 +186,7 @@ impl Executive {
         is_open: &dyn Fn(u16) -> bool,
         events: &mut Vec<Event>,
     ) -> Way {
-        let mut way = Way {
-            cut_m,
-            cut,
-            moves: Vec::new(),
-            idle_m: 0.0,
-            arrives: None,
-        };
+        let mut way = Way::new(cut_m, cut);
         match self.aim {
             Aim::Hold
             | Aim::Circle(_)
@@ -458,6 +446,17 @@ struct Way {
 }
 
 impl Way {
+    /// One without any move yet.
+    fn new(cut_m: f64, cut: Place) -> Self {
+        Self {
+            cut_m,
+            cut,
+            moves: Vec::new(),
+            idle_m: 0.0,
+            arrives: None,
+        }
+    }
+
     /// One move more; ways off the loop in parts.
     fn push(&mut self, step: Move) {
         match step {

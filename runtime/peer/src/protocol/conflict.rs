@@ -360,8 +360,7 @@ impl Conflicts {
                     let motion = Motion::new(plan.clone()).ok()?;
                     suits(&motion).then_some((nth, until_ms, motion))
                 })?;
-        self.branch_ms = until_ms;
-        self.offered_ms = now_ms;
+        self.note_offer(now_ms, until_ms);
         self.promises.propose(motion);
         Some(nth)
     }
@@ -379,8 +378,7 @@ impl Conflicts {
             off.then_some((nth, until_ms, motion))
         };
         let (nth, until_ms, motion) = motions.into_iter().enumerate().find_map(possible)?;
-        self.branch_ms = until_ms;
-        self.offered_ms = now_ms;
+        self.note_offer(now_ms, until_ms);
         self.promises.plead(motion);
         Some(nth)
     }
@@ -515,6 +513,12 @@ impl Conflicts {
         (mine - seen.at).norm() < own_m + flown_m + reach.promised_m + least_m
     }
 
+    /// Something is put on offer now, that has to be agreed until a time.
+    fn note_offer(&mut self, now_ms: u64, until_ms: u64) {
+        self.offered_ms = now_ms;
+        self.branch_ms = until_ms;
+    }
+
     /// Looks for a way to what is wanted, and proposes it.
     fn propose(&mut self, now_ms: u64) -> bool {
         let Some(wish) = self.wish else {
@@ -533,8 +537,7 @@ impl Conflicts {
         let Some(motion) = self.search(wish, now_ms, branch_ms) else {
             return false;
         };
-        self.branch_ms = branch_ms;
-        self.offered_ms = now_ms;
+        self.note_offer(now_ms, branch_ms);
         self.promises.propose(motion);
         // Where nobody has to be asked it is agreed already.
         let _ = self.settle(now_ms);

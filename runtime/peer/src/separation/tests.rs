@@ -5,10 +5,6 @@ use crate::testing::airframe;
 use skein_flight::separation::{End, Stretch};
 use skein_geometry::frame::Pose;
 
-fn me(id: u16) -> Member {
-    Member { id, incarnation: 1 }
-}
-
 fn straight_on(from_ms: u64) -> MotionPlan {
     MotionPlan {
         start_ms: from_ms,
@@ -49,7 +45,11 @@ fn flies(flown: MotionPlan) -> Separation {
         fastest_mps: 15.0,
         turn_radius_m: 50.0,
     };
-    let mut separation = Separation::new(me(1), rules, airframe());
+    let me = Member {
+        id: 1,
+        incarnation: 1,
+    };
+    let mut separation = Separation::new(me, rules, airframe());
     separation.conflicts = Some(conflicts(1, flown));
     separation.clocks = (Time(0), 10_000);
     let _ = separation.speak(10_000);
