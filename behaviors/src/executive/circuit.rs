@@ -6,7 +6,10 @@
 //! | nobody is heard of, or it is not on the loop yet | as in all flight |
 //! | the next one ahead is farther than the next one behind, or as far | as in all flight |
 //! | nearer | less, by [`SLOWER_PER_S`] for each metre of difference, and no less than is safe |
-//! | nearer by more than two circles and a half | the same, and a circle at the next boundary with room |
+//! | nearer by more than two circles and a half | the same, and a circle at the next boundary with room, where that still holds when the circle begins |
+//!
+//! Who circles is where its circle ends, less what is left of it: beside the loop it keeps its
+//! place in the order, so that of two who are near one another one circles, and not both in turn.
 //!
 //! Nobody flies faster than it would alone, so the slowest sets the pace of all, and all who
 //! fly evenly fly at full speed. Distances are counted through the air along the loop: in a wind
@@ -20,12 +23,13 @@
 //! A look at the others costs a few operations for each of them and each 15 m of the loop.
 
 use super::transit::{CellVisit, Move, Place, Transit};
-use super::{Aim, Executive, Kind};
+use super::{Aim, Executive, Kind, Stretch};
 use crate::reactive::air::Air;
 use skein_flight::coverage::ring::Direction;
 use skein_geometry::Segment;
 use skein_geometry::frame::Pose;
-use skein_geometry::math::cos;
+use skein_geometry::math::{cos, wrap_pi, wrap_tau};
+use std::f64::consts::{FRAC_PI_4, TAU};
 
 /// By how much slower somebody flies for each metre by which who is ahead is nearer than who is
 /// behind, m/s: differences between n UAVs are halved in some n²/π² · 14 s.
@@ -39,6 +43,9 @@ const MARK_M: f64 = 15.0;
 
 /// Farther from the loop than this somebody is not on it, metres: two lanes.
 const OFF_M: f64 = 100.0;
+
+/// Whose heading is farther from that of the loop circles, or turns round to fly it.
+const CIRCLING_RAD: f64 = FRAC_PI_4;
 
 /// What a heading against the loop counts as, metres beside: lanes flown to and fro lie beside
 /// or upon one another.
@@ -179,16 +186,17 @@ impl Transit {
 
 impl Measured<'_> {
     /// How far along the loop a pose is, through the air, metres. `None` where it is not on it.
+    /// Who circles there has that much less of it behind it as is left of its circle.
     fn along_m(&self, pose: Pose) -> Option<f64> {
         let (mark, on_m) = nearest(self.marks, pose)?;
         let before_m = mark.share * self.transit.forward_m(mark.cell);
-        Some(self.begins_m[usize::from(mark.cell)] + before_m + on_m)
+        let left_m = self.transit.wide_circle_m() * circle_left(&mark.pose, pose);
+        Some(self.begins_m[usize::from(mark.cell)] + before_m + on_m - left_m)
     }
 
-    /// Who is next ahead of a pose on the loop and who behind. `None` where it is not on the
-    /// loop, or nobody else is.
-    fn gaps(&self, pose: Pose, others: &[Fellow]) -> Option<Gaps> {
-        let at_m = self.along_m(pose)?;
+    /// Who is next ahead of somebody so far along the loop and who behind. `None` where nobody
+    /// else is on it.
+    fn gaps(&self, at_m: f64, others: &[Fellow]) -> Option<Gaps> {
         let speed_mps = self.transit.air().airspeed_mps;
         let ahead_m = |other: &Fellow| {
             let then_m = self.along_m(other.pose)?;
@@ -222,6 +230,19 @@ fn nearest(marks: &[Mark], pose: Pose) -> Option<(&Mark, f64)> {
     Some((nearest, on_m.clamp(-MARK_M, MARK_M)))
 }
 
+/// What share of its circle somebody has left who circles beside the loop; 0 for who flies along
+/// it.
+fn circle_left(on: &Pose, pose: Pose) -> f64 {
+    let turned_rad = wrap_pi(pose.heading_rad - on.heading_rad);
+    if turned_rad.abs() < CIRCLING_RAD {
+        return 0.0;
+    }
+    let off = pose.position() - on.position();
+    let is_left = on.direction().perp(&off) >= 0.0;
+    let flown_rad = wrap_tau(if is_left { turned_rad } else { -turned_rad });
+    1.0 - flown_rad / TAU
+}
+
 impl Executive {
     /// Where the others are who fly round the loop as this UAV does: it keeps as far behind the
     /// one ahead as before the one behind. Nothing changes for who flies by another goal.
@@ -236,7 +257,31 @@ impl Executive {
             self.circuit.marks = self.transit.marks();
         }
         let measured = self.transit.measured(&self.circuit.marks);
-        self.circuit.gaps = measured.gaps(here, others);
+        let along_m = match self.stretches.front() {
+            Some(Stretch {
+                kind: Kind::Loiter(_),
+                end_m,
+                end,
+            }) => {
+                let end_along_m = measured.along_m(end.pose);
+                end_along_m.map(|m| m - self.air_m_until(*end_m))
+            }
+            _ => measured.along_m(here),
+        };
+        self.circuit.gaps = along_m.and_then(|m| measured.gaps(m, others));
+        self.give_up_circle();
+    }
+
+    /// A circle that is not begun is flown only as long as it lacks room.
+    fn give_up_circle(&mut self) {
+        let is_circle = |s: &Stretch| matches!(s.kind, Kind::Loiter(_));
+        let ahead = self.stretches.iter().skip(1).position(is_circle);
+        let Some(kept) = ahead.map(|i| i + 1) else {
+            return;
+        };
+        if self.waits_for_room(&self.stretches[kept - 1].end).is_none() {
+            self.keep(kept);
+        }
     }
 
     /// Who is before and behind it, where it flies round the loop and knows of others.
@@ -292,6 +337,7 @@ mod tests {
     use crate::Goal;
     use crate::testing::{Wing, airframe, loop_and_router, square};
     use skein_geometry::frame::Point;
+    use std::f64::consts::PI;
 
     fn round(wing: &Wing) -> Executive {
         let (coverage_loop, router) = loop_and_router(12, 10, vec![square(200.0, 100.0, 80.0)]);
@@ -365,7 +411,49 @@ mod tests {
         assert!(is_full(speed(&[away])));
     }
 
-    /// Four who begin side by side: the largest gap over an even one, after some laps.
+    /// The largest gap between those who fly round over an even one; infinite while one of them is
+    /// not on the loop.
+    fn unevenness(all: &[(Wing, Executive)]) -> f64 {
+        let marks = all[0].1.transit.marks();
+        let measured = all[0].1.transit.measured(&marks);
+        let whole_m = measured.whole_m;
+        let at = all.iter().map(|(w, _)| measured.along_m(w.pose));
+        let Some(at) = at.collect::<Option<Vec<f64>>>() else {
+            return f64::INFINITY;
+        };
+        let to_next = |m: f64| {
+            let others = at.iter().map(|o| (o - m).rem_euclid(whole_m));
+            others.filter(|d| *d > 0.0).fold(whole_m, f64::min)
+        };
+        let widest_m = at.iter().map(|a| to_next(*a)).fold(0.0, f64::max);
+        #[allow(clippy::cast_precision_loss, reason = "a few")]
+        let n = all.len() as f64;
+        widest_m * n / whole_m
+    }
+
+    /// All fly for a step of 200 ms; where `told` says so they hear where each other one was
+    /// `age_ms` ago.
+    fn fly(all: &mut [(Wing, Executive)], told: Option<&[Fellow]>) {
+        for (i, (wing, executive)) in all.iter_mut().enumerate() {
+            if let Some(told) = told {
+                let others = told.iter().enumerate().filter(|(j, _)| *j != i);
+                let others: Vec<Fellow> = others.map(|(_, fellow)| *fellow).collect();
+                executive.keep_even(&others);
+            }
+            let (setpoint, _) = executive.step(&wing.percept(), &|_| false);
+            wing.setpoint = Some(setpoint);
+            wing.fly(200);
+        }
+    }
+
+    fn told(all: &[(Wing, Executive)], age_ms: u32) -> Vec<Fellow> {
+        let fellow = |(wing, _): &(Wing, Executive)| Fellow {
+            pose: wing.pose,
+            age_ms,
+        };
+        all.iter().map(fellow).collect()
+    }
+
     #[test]
     fn who_begin_together_end_evenly_spaced() {
         let mut all: Vec<(Wing, Executive)> = (0..4)
@@ -375,42 +463,53 @@ mod tests {
                 (wing, executive)
             })
             .collect();
-        let gaps = |all: &[(Wing, Executive)]| {
-            let marks = all[0].1.transit.marks();
-            let measured = all[0].1.transit.measured(&marks);
-            let whole_m = measured.whole_m;
-            let at = all.iter().map(|(w, _)| measured.along_m(w.pose));
-            let at: Vec<f64> = at.map(Option::unwrap).collect();
-            let to_next = |m: f64| {
-                let others = at.iter().map(|o| (o - m).rem_euclid(whole_m));
-                others.filter(|d| *d > 0.0).fold(whole_m, f64::min)
-            };
-            at.iter().map(|a| to_next(*a)).fold(0.0, f64::max) / (whole_m / 4.0)
-        };
         let mut begun = None;
         for step in 0..12_000 {
-            let poses: Vec<Pose> = all.iter().map(|(w, _)| w.pose).collect();
-            for (i, (wing, executive)) in all.iter_mut().enumerate() {
-                if step % 5 == 0 {
-                    let others = poses.iter().enumerate().filter(|(j, _)| *j != i);
-                    let fellow = |(_, pose): (usize, &Pose)| Fellow {
-                        pose: *pose,
-                        age_ms: 400,
-                    };
-                    let others: Vec<Fellow> = others.map(fellow).collect();
-                    executive.keep_even(&others);
-                }
-                let (setpoint, _) = executive.step(&wing.percept(), &|_| false);
-                wing.setpoint = Some(setpoint);
-                wing.fly(200);
-            }
+            let fellows = (step % 5 == 0).then(|| told(&all, 400));
+            fly(&mut all, fellows.as_deref());
             if step == 300 {
-                begun = Some(gaps(&all));
+                begun = Some(unevenness(&all));
             }
         }
         assert!(begun.is_some_and(|g| g > 2.5), "{begun:?}");
-        let ended = gaps(&all);
+        let ended = unevenness(&all);
         assert!(ended < 1.1, "{ended}");
+    }
+
+    /// Two near one another, one of whom turns round first, and who hear each other late: the one
+    /// who is behind circles, and not both in turn.
+    #[test]
+    fn of_two_who_are_near_one_circles() {
+        let any = round(&Wing::new(Pose::new(Point::new(0.0, 0.0), 0.0)));
+        let at = on(&any, 10);
+        let begin = |pose: Pose| {
+            let wing = Wing::new(pose);
+            let executive = round(&wing);
+            (wing, executive)
+        };
+        let mut slowest = 0;
+        for ahead_m in (-6..=6).map(|k| 25.0 * f64::from(k) + 3.0) {
+            for (turned_rad, late) in [(0.0, 2), (0.0, 16), (PI, 2), (PI, 8), (PI, 16)] {
+                let there = at.position() + ahead_m * at.direction();
+                let other = Pose::new(there, at.heading_rad + turned_rad);
+                let mut all = vec![begin(at), begin(other)];
+                let mut heard = Vec::new();
+                let mut steps = 0;
+                while unevenness(&all) > 1.5 && steps < 3_000 {
+                    if steps % late == 0 {
+                        heard = told(&all, 0);
+                    }
+                    let age_ms = 200 * (steps % late);
+                    let aged = heard.iter().map(|f: &Fellow| Fellow { age_ms, ..*f });
+                    let aged: Vec<Fellow> = aged.collect();
+                    fly(&mut all, Some(&aged));
+                    steps += 1;
+                }
+                slowest = slowest.max(steps);
+            }
+        }
+        // Where both circle, some pairs take above 600.
+        assert!(slowest < 600, "{slowest}");
     }
 
     /// Where an excursion leaves the loop it comes back: its beginning and its end are one place.

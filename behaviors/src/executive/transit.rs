@@ -698,6 +698,11 @@ impl Transit {
         (room_m >= self.router.limits().clearance_m - ROUNDING_M).then_some(circle)
     }
 
+    /// How long a circle is where there is room for a wide one, metres.
+    pub(super) fn wide_circle_m(&self) -> f64 {
+        TAU * LOITER_RADII[0] * self.turn_radius_m()
+    }
+
     /// The circle through a pose that keeps farthest from the zones, and how far; a
     /// wide one if that keeps clear.
     fn circle(&self, pose: &Pose) -> (Segment, f64) {

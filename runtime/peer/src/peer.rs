@@ -619,7 +619,8 @@ impl Peer {
         }
         let (interval, sharers) = (self.relay.air.interval(), self.relay.air.counted());
         let body = if let Some(entries) = entries {
-            let (mut gossip, fresh) = self.membership.tell(self.now, entries);
+            let behind = self.relay.take_behind();
+            let (mut gossip, fresh) = self.membership.tell(self.now, entries, &behind);
             let heartbeat = self.outbound.heartbeat().saturating_add(1);
             for g in &mut gossip {
                 (g.max_seq, g.digest) = self.relay.version(g.id, g.incarnation, heartbeat);

@@ -9,7 +9,7 @@ use skein_peer::diagram::{Machine, MissionEvent, Part, StateGoal};
 use skein_peer::output::Status;
 use skein_peer::wire::detection::Stands;
 use skein_peer::wire::message::Order;
-use skein_peer::wire::tasks::Progress;
+use skein_peer::wire::tasks::{Progress, TaskId};
 use skein_peer::{Mission, WIND_CALMER_MPS};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -60,6 +60,8 @@ struct Last {
     /// Whether it was seen in another one just before.
     came: bool,
     facts: BTreeMap<(MissionEvent, u32), bool>,
+    /// What it knew to be found.
+    told: BTreeSet<TaskId>,
 }
 
 #[derive(Clone, Debug)]
@@ -253,8 +255,11 @@ impl ActivityCheck {
         }
         let is_first = last.is_none();
         // And where, whatever came and went between the two.
+        let told = facts.told();
+        // What was found is withdrawn, and a moment later found by another: in between it is not.
+        let is_replaced = last.is_some_and(|l| l.told.is_disjoint(&told) && !told.is_empty());
         let passing = |key: (MissionEvent, u32), now: Holds| {
-            if self.is_passing(key.0) {
+            if self.is_passing(key.0) || key.0 == MissionEvent::ObjectDetected && is_replaced {
                 Holds::Maybe
             } else {
                 either(key, now)
@@ -272,6 +277,7 @@ impl ActivityCheck {
             entered_ms,
             came,
             facts: facts.known(),
+            told,
         };
         self.last.insert(id, next);
         if may.contains(&at) || is_first {
@@ -484,8 +490,14 @@ impl Facts<'_> {
     /// Whether it knows of something that its mission looks for. Whether that is there is judged
     /// by a rule of its own.
     fn is_found(&self) -> bool {
-        let mut all = self.m.view.detections.iter();
-        all.any(|(_, d)| d.stands == Stands::Told && d.sortie == self.flown.sortie)
+        !self.told().is_empty()
+    }
+
+    /// What it knows of that its mission looks for.
+    fn told(&self) -> BTreeSet<TaskId> {
+        let all = self.m.view.detections.iter();
+        let told = all.filter(|(_, d)| d.stands == Stands::Told && d.sortie == self.flown.sortie);
+        told.map(|(id, _)| *id).collect()
     }
 
     /// To which states one look may lead from there.
@@ -531,7 +543,6 @@ mod tests {
     use skein_peer::Mission;
     use skein_peer::diagram::{State, Transition};
     use skein_peer::wire::detection::Detection;
-    use skein_peer::wire::tasks::TaskId;
     use std::sync::Arc;
 
     fn mission() -> Arc<Mission> {
@@ -782,6 +793,49 @@ mod tests {
             Stands::Withdrawn
         ]));
         assert!(broken(&[Stands::Withdrawn]));
+    }
+
+    /// It came from a task when what was found was withdrawn, and waits; then another tells the
+    /// same thing.
+    #[test]
+    fn what_is_found_again_by_another_was_not_found_in_between() {
+        let mission = with_state("found", Some(Part::Ends), (MissionEvent::ObjectDetected, 0));
+        let machine = mission.machine().unwrap();
+        let at = |name| {
+            machine
+                .states()
+                .iter()
+                .position(|s| s.name == name)
+                .unwrap()
+        };
+        let broken = |second: u16| {
+            let (mut story, mut findings) = (Story::new(0), Findings::new(1));
+            let mut check = ActivityCheck::default();
+            check.on_mission(&mission);
+            let states = [
+                ("task", 2),
+                ("task", 2),
+                ("wait", second),
+                ("found", second),
+            ];
+            for (t, (name, author)) in (0..).zip(states) {
+                let told = Detection {
+                    stands: Stands::Told,
+                    ..Detection::default()
+                };
+                let view = Beliefs {
+                    stage: Some((at(name), MissionEvent::Otherwise)),
+                    detections: vec![(TaskId { author, number: 8 }, told)],
+                    ..speaking()
+                };
+                story.snapshot(t * 1000, &[(1, view)], |s| {
+                    check.on_snapshot(s, &mut findings)
+                });
+            }
+            findings.counts.contains_key("activity")
+        };
+        assert!(!broken(3));
+        assert!(broken(2), "it was found all the time");
     }
 
     #[test]

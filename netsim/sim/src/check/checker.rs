@@ -150,7 +150,7 @@ impl Checker {
     /// Cells are counted on another loop from now on: another lap begins, or another mission.
     pub fn on_new_loop(&mut self, loop_hash: u64) {
         self.loop_hash = loop_hash;
-        self.listing = ListingCheck::default();
+        self.listing.on_new_loop();
         self.cover = CoverCheck::default();
         self.progress = ProgressCheck::default();
     }

@@ -44,6 +44,8 @@ pub struct ListingCheck {
     claimed_by_dead: BTreeMap<u16, u16>,
     able_since_ms: Option<u64>,
     heard: BTreeMap<(u16, u16), (Arc<Claim>, Version)>,
+    /// The same of the loop before, of whom the newest section is one of another loop.
+    left: BTreeMap<(u16, u16), (Arc<Claim>, Version)>,
     clashes: Clocks<(u16, u16, u16)>,
 }
 
@@ -57,9 +59,20 @@ impl ListingCheck {
         }
     }
 
+    /// Cells are counted on another loop from now on. What was heard stands: each claim names its
+    /// loop.
+    pub fn on_new_loop(&mut self) {
+        *self = Self {
+            heard: std::mem::take(&mut self.heard),
+            left: std::mem::take(&mut self.left),
+            ..Self::default()
+        };
+    }
+
     /// A process ended.
     pub fn on_death(&mut self, id: u16) {
         self.heard.retain(|(o, _), _| *o != id);
+        self.left.retain(|(o, _), _| *o != id);
     }
 
     /// A peer was given another's section. What was written earlier than what it has
@@ -69,9 +82,14 @@ impl ListingCheck {
             return;
         }
         let known = self.heard.get(&(by, author));
-        if known.is_none_or(|(_, v)| *v < version) {
-            self.heard
-                .insert((by, author), (Arc::clone(claim), version));
+        if known.is_some_and(|(_, v)| *v >= version) {
+            return;
+        }
+        let new = (Arc::clone(claim), version);
+        if let Some(before) = self.heard.insert((by, author), new)
+            && before.0.loop_hash != claim.loop_hash
+        {
+            self.left.insert((by, author), before);
         }
     }
 
@@ -80,6 +98,16 @@ impl ListingCheck {
     pub fn heard(&self, by: u16, author: u16) -> Option<(&Arc<Claim>, u32)> {
         let heard = self.heard.get(&(by, author));
         heard.map(|(claim, version)| (claim, version.0))
+    }
+
+    /// The newest section on this loop of one peer that another heard, and in which life it was
+    /// said: what somebody listed before it went on to another loop stands for who stays.
+    #[must_use]
+    pub fn heard_on(&self, by: u16, author: u16, loop_hash: u64) -> Option<(&Arc<Claim>, u32)> {
+        let both = [self.heard.get(&(by, author)), self.left.get(&(by, author))];
+        let mut both = both.into_iter().flatten();
+        let (claim, version) = both.find(|(claim, _)| claim.loop_hash == loop_hash)?;
+        Some((claim, version.0))
     }
 
     /// Judges everybody's plans.
@@ -274,7 +302,8 @@ impl ListingCheck {
                 .into_iter()
                 .flatten()
                 .filter(|((_, author), _)| members.silence(*author).is_some());
-            let mut yielded = silent.filter(|(_, (claim, _))| planned(claim, n).any(|c| c == cell));
+            let here = silent.filter(|(_, (claim, _))| claim.loop_hash == snapshot.loop_hash);
+            let mut yielded = here.filter(|(_, (claim, _))| planned(claim, n).any(|c| c == cell));
             owner = yielded.next().map(|((_, author), _)| *author).or(owner);
         }
         let o = self.orphans.entry(cell).or_insert(Orphan {
@@ -662,6 +691,34 @@ mod tests {
             plan: vec![run],
             ..Claim::default()
         })
+    }
+
+    #[test]
+    fn what_was_claimed_before_its_author_went_on_to_another_loop_is_known_of_the_loop_it_left() {
+        let mut check = ListingCheck::default();
+        let on = |loop_hash| {
+            Arc::new(Claim {
+                loop_hash,
+                ..Claim::default()
+            })
+        };
+        let (mine, theirs) = (claim_of_two(), on(10));
+        check.on_heard((1, 2), (1, 3), &mine);
+        assert_eq!(check.heard_on(1, 2, 9), Some((&mine, 1)));
+        check.on_heard((1, 2), (1, 5), &theirs);
+        check.on_heard((1, 2), (1, 4), &on(9));
+        check.on_new_loop();
+        assert_eq!(check.heard(1, 2), Some((&theirs, 1)));
+        assert_eq!(check.heard_on(1, 2, 10), Some((&theirs, 1)));
+        assert_eq!(
+            check.heard_on(1, 2, 9),
+            Some((&mine, 1)),
+            "the newest of it"
+        );
+        assert_eq!(check.heard_on(1, 2, 11), None);
+        assert_eq!(check.heard_on(3, 2, 9), None);
+        check.on_death(1);
+        assert_eq!(check.heard_on(1, 2, 9), None);
     }
 
     #[test]

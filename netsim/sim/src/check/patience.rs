@@ -205,14 +205,14 @@ impl PatienceCheck {
         }
     }
 
-    /// A peer gives another up. `heard` are the newest claims it has heard, by author, with
-    /// the life in which they were said.
+    /// A peer gives another up. `heard` are the newest claims it has heard, by author and loop,
+    /// with the life in which they were said.
     pub fn on_down<'a>(
         &mut self,
         now_ms: u64,
         (observer, subject): (u16, u16),
         incarnation: Incarnation,
-        heard: impl Fn(u16) -> Option<(&'a Arc<Claim>, Incarnation)>,
+        heard: impl Fn(u16, u64) -> Option<(&'a Arc<Claim>, Incarnation)>,
         handicaps: &Handicaps,
     ) {
         self.lives.remove(&(observer, subject));
@@ -239,12 +239,10 @@ impl PatienceCheck {
             return;
         }
         let n = view.covered.capacity();
-        let Some((claim, life)) = heard(subject) else {
+        let heard = |author| heard(author, view.loop_hash);
+        let Some((claim, _)) = heard(subject).filter(|(_, life)| *life == incarnation) else {
             return;
         };
-        if life != incarnation || claim.loop_hash != view.loop_hash {
-            return;
-        }
         let mut orphans: BTreeSet<u16> = listed(claim, n)
             .filter(|c| !view.covered.contains(*c))
             .collect();
@@ -587,7 +585,7 @@ mod tests {
             let (mut check, mut found) = (PatienceCheck::new(1000), Findings::new(1));
             check.on_told(25_050, 1, (1, 1));
             able_until(&mut check, 30, &mut found);
-            let heard = |id| (id == 2).then_some((&claim, 1));
+            let heard = |id, on| (id == 2 && on == LOOP).then_some((&claim, 1));
             check.on_down(30_100, (1, 2), 1, heard, &drift(ppm));
             Story::new(300).snapshot(31_000, &[(1, speaking())], |s| {
                 check.on_snapshot(s, &mut found);
@@ -667,9 +665,9 @@ mod tests {
             able_until(&mut check, 30, &mut found);
             besides(&mut check);
             let dead = claim(cells);
-            let heard = |id| match id {
-                2 => Some((&dead, 1)),
-                3 => Some((&dead, 2)),
+            let heard = |id, on| match id {
+                2 if on == LOOP => Some((&dead, 1)),
+                3 if on == LOOP => Some((&dead, 2)),
                 _ => None,
             };
             check.on_down(30_100, (1, 2), 1, heard, &Handicaps::default());

@@ -199,7 +199,7 @@ impl Rules {
                 self.cadence
                     .on_belief(now_ms, about, belief, (diameter, handicaps), found);
                 if *status == Status::Down {
-                    let heard = |author| listing.heard(id, author);
+                    let heard = |author, on| listing.heard_on(id, author, on);
                     self.patience
                         .on_down(now_ms, about, *incarnation, heard, handicaps);
                 } else {

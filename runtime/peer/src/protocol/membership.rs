@@ -835,11 +835,16 @@ impl Membership {
         changes
     }
 
-    /// What a beacon says of others in the room of so many entries: whole entries, and
-    /// heartbeats alone.
-    pub fn tell(&mut self, now: Time, entries: usize) -> (Vec<Gossip>, Vec<Fresh>) {
+    /// What a beacon says of others in the room of so many entries: whole entries, soon of those
+    /// `behind` whose records neighbours have newer, and heartbeats alone.
+    pub fn tell(
+        &mut self,
+        now: Time,
+        entries: usize,
+        behind: &BTreeSet<u16>,
+    ) -> (Vec<Gossip>, Vec<Fresh>) {
         let moment = self.moment(now);
-        self.telling.tell(&mut self.known, moment, entries)
+        self.telling.tell(&mut self.known, moment, entries, behind)
     }
 
     /// What the next heartbeat says of others.

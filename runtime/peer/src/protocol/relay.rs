@@ -13,6 +13,7 @@
 //! | held in a newer version, or of an earlier life and no piece of a mission | it is heard | nothing |
 //! | any of an author but pieces of missions | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
+//! | less of an author than a neighbour's beacon shows, or other versions | that beacon is heard | one of the next beacons tells of that author, so that who has them says them again |
 //! | pieces of a mission | pieces of a newer one of its author come | held until that one is whole and followed; said again once no more of it come (the module `pieces`) |
 //! | a piece of a mission | a neighbour lacks it: its beacon, the last ten intervals considered, shows an older revision, and it says no pieces of that mission or this one; else it only is held | passed on, or sent again as to who lacks it |
 //! | a piece of a mission | it is due | of all that wait goes first what was never on the air, then what most lack, what nobody passed on, what was on the air longest ago |
@@ -49,7 +50,7 @@ mod wants;
 
 pub use queue::MAX_QUEUE;
 use queue::{Queue, Standing, Waiting};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use wants::{Mission, Wants};
 
 /// Most records held: 256 peers with a state, a bid, a claim, an order, a finish and
@@ -209,6 +210,8 @@ pub struct Relay {
     held: BTreeMap<RecordKey, Held>,
     queue: Queue,
     answered: BTreeMap<u16, Time>,
+    /// Authors of whom neighbours have what this peer may lack, since its last beacon.
+    behind: BTreeSet<u16>,
     wants: Wants,
     /// Which revision this peer's last beacon showed.
     follows: u32,
@@ -228,6 +231,7 @@ impl Relay {
             held: BTreeMap::new(),
             queue: Queue::new(),
             answered: BTreeMap::new(),
+            behind: BTreeSet::new(),
             wants: Wants::default(),
             follows: 0,
             newest_piece: 0,
@@ -647,10 +651,14 @@ impl Relay {
         }
         let life = self.newest_life(author);
         let (mine_seq, mine_digest) = self.version(author, life, beacon);
-        if life == 0 || life < incarnation || (life == incarnation && mine_seq < max_seq) {
+        if (life, mine_seq, mine_digest) == (incarnation, max_seq, digest) {
             return;
         }
-        if (life, mine_seq, mine_digest) == (incarnation, max_seq, digest) {
+        let known = self.behind.len() < PEERS_MAX && author != self.me;
+        if known && max_seq > 0 && (life, mine_seq) <= (incarnation, max_seq) {
+            self.behind.insert(author);
+        }
+        if life == 0 || (life, mine_seq) < (incarnation, max_seq) {
             return;
         }
         self.answered.insert(author, now);
@@ -676,6 +684,12 @@ impl Relay {
                 self.send_again(now, key, kind);
             }
         }
+    }
+
+    /// Of whom neighbours have what this peer may lack, as beacons showed since it was asked last:
+    /// by the ids of the authors.
+    pub fn take_behind(&mut self) -> BTreeSet<u16> {
+        core::mem::take(&mut self.behind)
     }
 
     /// The versions held of an author's records of one life, pieces of missions left out:

@@ -5,7 +5,7 @@ use crate::input::Time;
 use crate::protocol::airtime::{ENTRY_BYTES, FRESH_BYTES};
 use crate::wire::message::{Fresh, Gossip};
 use core::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A heartbeat carries so many of others at most: then it is half as long as a beacon.
 const BETWEEN_MAX: usize = 8;
@@ -41,6 +41,8 @@ pub(super) struct Telling {
     next: u16,
     /// So many heartbeats of others the next own one carries.
     between: usize,
+    /// Whether the next odd entry is for the rotation.
+    rotates: bool,
 }
 
 impl Telling {
@@ -49,6 +51,7 @@ impl Telling {
         Self {
             next: me,
             between: 0,
+            rotates: false,
         }
     }
 
@@ -62,15 +65,19 @@ impl Telling {
         peers: &mut Peers,
         moment: Moment,
         entries: usize,
+        behind: &BTreeSet<u16>,
     ) -> (Vec<Gossip>, Vec<Fresh>) {
         if peers.len() <= entries {
             self.between = 0;
-            return (self.whole(peers, moment, entries), Vec::new());
+            return (
+                self.whole(peers, moment, entries, &BTreeSet::new()),
+                Vec::new(),
+            );
         }
         let untold = |k: &&Known| k.is_untold_news(moment.now);
         let news = peers.values().filter(untold).count();
         let full = entries.div_ceil(4) + news.min(entries / 4);
-        let told = self.whole(peers, moment, full);
+        let told = self.whole(peers, moment, full, behind);
         let room = (entries - full) * ENTRY_BYTES / FRESH_BYTES;
         self.between = room.div_ceil(2).min(BETWEEN_MAX);
         let fresh = heartbeats(peers, moment, &told, room - self.between, true);
@@ -87,9 +94,16 @@ impl Telling {
     /// Whole entries of others: at most `max`. Who began a life anew without
     /// knowing is reminded first (a quarter of the entries at most), then news (half of
     /// the rest at most), then those whom a neighbour is farther from than this peer (two
-    /// thirds of the rest), then all in rotation, so that nobody is left out for long. The
-    /// relay fills in the versions of records.
-    pub(super) fn whole(&mut self, peers: &mut Peers, moment: Moment, max: usize) -> Vec<Gossip> {
+    /// thirds of the rest), then those `behind` whose records neighbours have newer (half of the
+    /// rest, of one entry every other time), then all in rotation, so that nobody is left out
+    /// for long. The relay fills in the versions of records.
+    pub(super) fn whole(
+        &mut self,
+        peers: &mut Peers,
+        moment: Moment,
+        max: usize,
+        behind: &BTreeSet<u16>,
+    ) -> Vec<Gossip> {
         let (now, interval_ms) = (moment.now, moment.interval_ms);
         let reminders = peers.values().filter_map(|k| k.reminder(now, interval_ms));
         let mut told: Vec<Gossip> = reminders.take(max / 4).collect();
@@ -113,8 +127,13 @@ impl Telling {
                 .take(room - room.div_ceil(3))
                 .map(|(_, id)| *id),
         );
-        let rotation = peers.range(self.next..).chain(peers.range(..self.next));
-        let rest: Vec<u16> = rotation
+        let in_turn = |next: u16| peers.range(next..).chain(peers.range(..next));
+        let room = max - ids.len();
+        let asked = in_turn(self.next).map(|(id, _)| *id);
+        let asked = asked.filter(|id| behind.contains(id) && !ids.contains(id));
+        let asked: Vec<u16> = asked.take(self.for_those_behind(room)).collect();
+        ids.extend(asked);
+        let rest: Vec<u16> = in_turn(self.next)
             .map(|(id, _)| *id)
             .filter(|id| !ids.contains(id))
             .take(max - ids.len())
@@ -132,6 +151,19 @@ impl Telling {
         let entries = ids.iter().filter_map(|id| peers.get(id));
         told.extend(entries.map(|k| k.gossip(now, interval_ms)));
         told
+    }
+
+    /// Half of so many entries; of an odd one every other time.
+    fn for_those_behind(&mut self, room: usize) -> usize {
+        if room.is_multiple_of(2) {
+            return room / 2;
+        }
+        self.rotates = !self.rotates;
+        if self.rotates {
+            room.div_ceil(2)
+        } else {
+            room / 2
+        }
     }
 }
 

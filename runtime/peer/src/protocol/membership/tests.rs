@@ -9,7 +9,8 @@ impl Membership {
     /// Whole entries of others: at most `max`.
     pub(super) fn gossip(&mut self, now: Time, max: usize) -> Vec<Gossip> {
         let moment = self.moment(now);
-        self.telling.whole(&mut self.known, moment, max)
+        self.telling
+            .whole(&mut self.known, moment, max, &BTreeSet::new())
     }
 
     fn measured(&self, now: Time) -> Extent {
@@ -406,6 +407,30 @@ fn every_peer_comes_round_in_gossip() {
     assert_eq!(told.len(), 48);
 }
 
+/// Of whom neighbours have newer records it tells next what it holds, so that they say them; the
+/// others come round all the same.
+#[test]
+fn whose_records_neighbours_have_newer_is_told_of_soon() {
+    let mut m = Membership::new(1, 1000);
+    for id in 2..=26 {
+        m.on_beacon(Time(0), id, 1, &beacon(5, Vec::new()));
+    }
+    no_news(&mut m);
+    let mut told = Vec::new();
+    for t in 0..60 {
+        // Of 17 and 20 a neighbour shows it again and again that it has more.
+        let behind = if t < 2 { vec![] } else { vec![17, 20] };
+        let now = Time(3_000 + t * 1_000);
+        let (whole, _) = m.tell(now, 4, &behind.into_iter().collect());
+        assert_eq!(whole.len(), 1, "a quarter of the room");
+        told.push(whole[0].id);
+    }
+    let first = told.iter().position(|id| *id == 17).unwrap();
+    assert!(first <= 3, "{told:?}");
+    let all: BTreeSet<u16> = told.iter().copied().collect();
+    assert_eq!(all, (2..=26).collect(), "nobody is left out");
+}
+
 /// Five others are neighbours; of two of them somebody else knows by more hops.
 #[test]
 fn those_whom_a_neighbour_is_farther_from_are_told_of_first() {
@@ -536,20 +561,20 @@ fn where_not_all_fit_most_of_the_room_is_for_heartbeats_alone() {
     };
     m.on_beacon(Time(3_000), 3, 1, &beacon(11, (4..14).map(far).collect()));
     let ids = |fresh: &[Fresh]| -> Vec<u16> { fresh.iter().map(|f| f.id).collect() };
-    let (told, fresh) = m.tell(Time(5_000), 4);
+    let (told, fresh) = m.tell(Time(5_000), 4, &BTreeSet::new());
     assert_eq!(told.iter().map(|g| g.id).collect::<Vec<_>>(), [2]);
     assert_eq!(ids(&fresh), [4, 5, 6]);
     assert_eq!(ids(&m.tell_between(Time(5_500))), [7, 8, 9, 10]);
     assert_eq!(m.tell_between(Time(5_600)).len(), 0, "once a beacon");
-    let (told, fresh) = m.tell(Time(6_000), 4);
+    let (told, fresh) = m.tell(Time(6_000), 4, &BTreeSet::new());
     assert_eq!(told.iter().map(|g| g.id).collect::<Vec<_>>(), [3]);
     assert_eq!(ids(&fresh), [11, 12, 13]);
     assert_eq!(ids(&m.tell_between(Time(6_500))), [4, 5, 6, 7]);
-    let (told, fresh) = m.tell(Time(7_000), 8);
+    let (told, fresh) = m.tell(Time(7_000), 8, &BTreeSet::new());
     assert_eq!((told.len(), fresh.len()), (2, 7));
     assert_eq!(m.tell_between(Time(7_500)).len(), 7);
-    m.tell(Time(8_000), 8);
-    let (told, fresh) = m.tell(Time(9_000), 19);
+    m.tell(Time(8_000), 8, &BTreeSet::new());
+    let (told, fresh) = m.tell(Time(9_000), 19, &BTreeSet::new());
     assert_eq!((told.len(), fresh.len()), (19, 0));
     assert_eq!(m.tell_between(Time(9_500)).len(), 0);
 }
@@ -561,7 +586,7 @@ fn news_take_a_quarter_of_the_room_and_leave_whole_entries_to_others() {
     for id in 21..40 {
         m.on_beacon(Time(4_900), id, 1, &beacon(1, Vec::new()));
     }
-    let (told, _) = m.tell(Time(5_000), 8);
+    let (told, _) = m.tell(Time(5_000), 8, &BTreeSet::new());
     let news = told.iter().filter(|g| g.id > 20).count();
     assert_eq!((told.len(), news), (4, 2));
 }
@@ -957,7 +982,7 @@ fn an_old_heartbeat_is_told_so_that_a_later_one_is_heard() {
             let count = 20 + u32::try_from(t).unwrap();
             m.on_heartbeat(now, id, 1, (count, 4));
         }
-        let (told, fresh) = m.tell(now, 4);
+        let (told, fresh) = m.tell(now, 4, &BTreeSet::new());
         let asks = fresh.iter().any(|f| f.id == 30);
         if asks && told.iter().all(|g| g.id != 30) {
             asked.push(t);

@@ -128,7 +128,8 @@ impl Net {
         node.next_beacon = self.now + interval_ms * 9 / 10 + self.dice.below(interval_ms / 5);
         node.heartbeat += 1;
         node.membership.tick(now);
-        let (mut gossip, mut fresh) = node.membership.tell(now, plan.entries);
+        let behind = node.relay.take_behind();
+        let (mut gossip, mut fresh) = node.membership.tell(now, plan.entries, &behind);
         // There are no heartbeats here.
         fresh.extend(node.membership.tell_between(now));
         fresh.sort_by_key(|f| f.id);

@@ -77,6 +77,35 @@ fn what_a_neighbour_lacks_is_sent_again() {
     assert_eq!(r.poll(Time(20_500)), None, "nothing is lacking");
 }
 
+#[test]
+fn of_whom_a_neighbour_shows_more_this_peer_says_what_it_holds() {
+    let mut r = relay(2);
+    for author in [1, 3] {
+        r.offer(Time(5_000), &record(author, 7), &[1; 40], 0);
+    }
+    let (seq, digest) = r.version(1, 1, BEACON);
+    let shows = |r: &mut Relay, told: Gossip| {
+        r.catch_up(Time(9_000), &told, BEACON);
+        r.take_behind().into_iter().collect::<Vec<u16>>()
+    };
+    assert_eq!(shows(&mut r, holds(1, 1, seq, digest)), [], "the same");
+    assert_eq!(shows(&mut r, holds(1, 1, 6, 0)), [], "less");
+    assert_eq!(shows(&mut r, holds(3, 1, 7, digest ^ 1)), [3], "others");
+    assert_eq!(
+        shows(&mut r, holds(1, 1, 8, 0)),
+        [],
+        "answered a moment ago"
+    );
+    r.catch_up(Time(20_000), &holds(1, 1, 8, 0), BEACON);
+    r.catch_up(Time(20_000), &holds(3, 2, 1, 0), BEACON);
+    r.catch_up(Time(20_000), &holds(4, 1, 1, 0), BEACON);
+    r.catch_up(Time(20_000), &holds(5, 1, 0, 0), BEACON);
+    r.catch_up(Time(20_000), &holds(2, 1, 9, 0), BEACON);
+    let behind: Vec<u16> = r.take_behind().into_iter().collect();
+    assert_eq!(behind, [1, 3, 4], "more, a later life, and one unknown");
+    assert!(r.take_behind().is_empty());
+}
+
 fn piece(subject: u16, chunks: u16) -> Record {
     let piece = MissionChunk {
         revision: 2,

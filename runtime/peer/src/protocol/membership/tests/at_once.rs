@@ -208,6 +208,10 @@ fn whose_own_suspicion_others_refute_is_far_from_somebody() {
         m.on_others(now, 3, &[of_4]);
         assert_eq!(m.status(4), Some((1, Status::Alive)));
         assert_eq!(m.is_far(now), is_far);
-        assert_eq!(m.tell(now, 4).1.len() > 1, is_far, "heartbeats of others");
+        assert_eq!(
+            m.tell(now, 4, &BTreeSet::new()).1.len() > 1,
+            is_far,
+            "heartbeats of others"
+        );
     }
 }
