@@ -337,10 +337,12 @@ impl Swarm {
         }
         let believes = |swarm: &Self| {
             let view = swarm.view(id);
-            // What depends on time alone is left out.
+            // What depends on time alone, and on what was heard before, is left out.
             view.map(|v| Beliefs {
                 loads: Vec::new(),
                 diameter: 0,
+                interval_ms: 0,
+                unheard: 0,
                 speaks: false,
                 ..v
             })

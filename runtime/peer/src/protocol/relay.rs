@@ -13,6 +13,7 @@
 //! | held in a newer version, or of an earlier life and no piece of a mission | it is heard | nothing |
 //! | any of an author but pieces of missions | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
+//! | this peer's own, and nobody was heard passing it on | a neighbour's beacon shows other records of this peer than it holds | sent again, once, whatever that neighbour has that is newer |
 //! | less of an author than a neighbour's beacon shows, or other versions | that beacon is heard | one of the next beacons tells of that author, so that who has them says them again |
 //! | pieces of a mission | pieces of a newer one of its author come | held until that one is whole and followed; said again once no more of it come (the module `pieces`) |
 //! | a piece of a mission | a neighbour lacks it: its beacon, the last ten intervals considered, shows an older revision, and it says no pieces of that mission or this one; else it only is held | passed on, or sent again as to who lacks it |
@@ -92,6 +93,10 @@ const LEAST_SPREAD: u64 = 8;
 /// waits is due so much later, and what is said meanwhile goes before it.
 const PIECE_INTERVALS: u64 = 3;
 
+/// Where it is not told which of an author's records are lacking, so many of its newest are said
+/// again, and as many others in turn: most often what came last did not arrive.
+const NEWEST: usize = 4;
+
 /// What was on the air within this part of an interval before a neighbour told what it lacks
 /// may have been on the way to it.
 const ON_THE_WAY: u64 = 4;
@@ -153,6 +158,25 @@ fn piece_of(kind: Kind, record: &Record) -> Option<MissionChunk> {
 fn mission_of(piece: Option<&MissionChunk>) -> (Option<Mission>, u16) {
     let mission = piece.map(|piece| (piece.revision, piece.content_hash));
     (mission, piece.map_or(0, |piece| piece.chunks))
+}
+
+/// Leaves of records `(key, seq, kind)` of which a beacon of this number may lack one those that it
+/// most likely does, and others in turn; of kinds of which digests tell all.
+fn leave_likely(lacking: &mut Vec<(RecordKey, u32, Kind)>, beacon: u32) {
+    let (mut left, mut untold): (Vec<_>, Vec<_>) = lacking
+        .drain(..)
+        .partition(|(_, _, kind)| digest::is_told(*kind));
+    untold.sort_unstable_by_key(|(_, seq, _)| Reverse(*seq));
+    let others = untold.split_off(untold.len().min(NEWEST));
+    let mut turn = Fnv::new();
+    turn.write(&beacon.to_le_bytes());
+    let first = (turn.finish() >> 16).checked_rem(others.len() as u64);
+    let first = first.and_then(|first| usize::try_from(first).ok());
+    let in_turn = others.iter().cycle().skip(first.unwrap_or(0));
+    left.extend(untold);
+    left.extend(in_turn.take(others.len().min(NEWEST)).copied());
+    left.sort_unstable_by_key(|(key, ..)| *key);
+    *lacking = left;
 }
 
 fn is_piece(key: &RecordKey) -> bool {
@@ -668,20 +692,28 @@ impl Relay {
             (false, true) => digest::differs(kind, mine_digest, digest),
             (false, false) => false,
         };
-        let lacking: Vec<(RecordKey, Kind)> = self
-            .held
-            .range(keys_of(author))
-            .filter(|(_, h)| {
-                h.record.incarnation == life && (now.since_ms(h.sent) >= quiet || h.copies == 0)
-            })
-            .filter_map(|(k, h)| Kind::of_number(k.1).map(|kind| (*k, h.record.seq, kind)))
+        // What nobody passed on that this peer said has arrived nowhere, whatever came later.
+        let is_unheard = |h: &Held| author == self.me && !h.is_passed_on;
+        let lacking = self.held.range(keys_of(author)).filter(|(_, h)| {
+            h.record.incarnation == life && (now.since_ms(h.sent) >= quiet || h.copies == 0)
+        });
+        let lacking = lacking
+            .filter_map(|(k, h)| Kind::of_number(k.1).map(|kind| (*k, h, kind)))
             .filter(|(_, _, kind)| is_counted(*kind))
-            .filter(|(_, seq, kind)| *seq > max_seq || differs(*kind))
-            .map(|(key, _, kind)| (key, kind))
+            .filter(|(_, h, kind)| h.record.seq > max_seq || differs(*kind) || is_unheard(h));
+        let mut lacking: Vec<(RecordKey, u32, Kind)> = lacking
+            .map(|(key, h, kind)| (key, h.record.seq, kind))
             .collect();
-        for (key, kind) in lacking {
+        if (life, mine_seq) == (incarnation, max_seq) {
+            leave_likely(&mut lacking, beacon);
+        }
+        for (key, _, kind) in lacking {
             if !self.queue.contains(&key) {
                 self.send_again(now, key, kind);
+            }
+            // Once: whoever hears it now may have passed it on before.
+            if let Some(held) = self.held.get_mut(&key).filter(|_| author == self.me) {
+                held.is_passed_on = true;
             }
         }
     }

@@ -47,6 +47,11 @@ pub(super) fn of(versions: impl Iterator<Item = (u8, u16, u32)>, beacon: u32) ->
     digest ^ (folded << HASH_FROM)
 }
 
+/// Whether digests tell of this kind by itself whether its versions differ.
+pub(super) fn is_told(kind: Kind) -> bool {
+    TOLD.iter().any(|(k, ..)| *k == kind)
+}
+
 /// Whether two digests may be of different versions of a kind. Where they differ and no kind
 /// is told to, any may.
 pub(super) fn differs(kind: Kind, mine: u16, theirs: u16) -> bool {

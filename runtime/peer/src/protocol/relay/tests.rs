@@ -532,6 +532,72 @@ fn a_digest_tells_which_records_are_held_and_not_only_the_newest() {
     assert_ne!(digest, other);
 }
 
+/// What this relay sends until then, by subject, as a modem would take it.
+fn sends(r: &mut Relay, from_ms: u64, until_ms: u64) -> BTreeSet<u16> {
+    let mut subjects = BTreeSet::new();
+    for t in (from_ms..until_ms).step_by(20) {
+        while let Some(out) = r.poll(Time(t)) {
+            let held = r.held.values().find(|h| h.bytes == out.bytes);
+            subjects.insert(held.unwrap().record.subject);
+        }
+    }
+    subjects
+}
+
+/// Records of one kind of which digests do not tell which differ, with subjects as their numbers.
+fn many(author: u16, seq: u32) -> (Record, Vec<u8>) {
+    let record = Record {
+        kind: Kind::Task.number(),
+        subject: u16::try_from(seq).unwrap(),
+        ..record(author, seq)
+    };
+    (record, vec![u8::try_from(seq).unwrap(); 20])
+}
+
+#[test]
+fn of_many_records_the_newest_are_said_again_and_others_in_turn() {
+    let mut r = relay(2);
+    for seq in 1..=20 {
+        let (record, bytes) = many(1, seq);
+        r.offer(Time(5_000), &record, &bytes, 0);
+        r.offer(Time(5_000), &record, &bytes, 0);
+    }
+    let newest: BTreeSet<u16> = (17..=20).collect();
+    let mut all = BTreeSet::new();
+    for beacon in 0..30 {
+        let now_ms = 20_000 + 20_000 * u64::from(beacon);
+        let (seq, digest) = r.version(1, 1, beacon);
+        r.catch_up(Time(now_ms), &holds(1, 1, seq, digest ^ 0x8000), beacon);
+        let said = sends(&mut r, now_ms, now_ms + 19_000);
+        assert_eq!(said.len(), 2 * NEWEST, "{said:?}");
+        assert!(said.is_superset(&newest), "{said:?}");
+        all.extend(said);
+    }
+    assert_eq!(all, (1..=20).collect());
+    // Who shows a lower number lacks all that came since.
+    r.catch_up(Time(700_000), &holds(1, 1, 3, 0), BEACON);
+    assert_eq!(sends(&mut r, 700_000, 720_000), (4..=20).collect());
+}
+
+/// Of two own records one is passed on; the other nobody has, and both are older than what a
+/// neighbour shows.
+#[test]
+fn what_nobody_passed_on_is_said_again_whatever_came_later() {
+    let mut r = relay(2);
+    for seq in 1..=4 {
+        let (record, bytes) = many(2, seq);
+        r.own(Time(5_000), &record, bytes);
+    }
+    assert_eq!(sends(&mut r, 5_000, 9_000).len(), 4);
+    for seq in [1, 3] {
+        r.echo(&many(2, seq).0);
+    }
+    r.catch_up(Time(20_000), &holds(2, 1, 3, 0), BEACON);
+    assert_eq!(sends(&mut r, 20_000, 39_000), BTreeSet::from([2, 4]));
+    r.catch_up(Time(40_000), &holds(2, 1, 3, 0), BEACON);
+    assert_eq!(sends(&mut r, 40_000, 59_000), BTreeSet::from([4]), "once");
+}
+
 #[test]
 fn of_equal_numbers_only_what_differs_is_said_again() {
     let of = |kind: Kind, seq| Record {
