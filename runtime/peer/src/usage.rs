@@ -74,6 +74,11 @@ const TURNED_MS: u64 = 30_000;
 /// What grows on and on is told once in so many intervals, and turns in twice as many.
 const TOLD_INTERVALS: u64 = 40;
 
+/// So many UAVs say a register each in one interval; among more each waits so many times as long
+/// as there are such many: at 64 kbit/s registers of 24 and what is passed on of them would take
+/// more than the air has.
+const UAVS_AN_INTERVAL: u64 = 8;
+
 /// Most registers of others that are kept: all of forty authors and lives.
 pub const KNOWN_MAX: usize = 2_560;
 
@@ -365,9 +370,11 @@ impl Using {
         }
     }
 
-    /// What is to be told now: one register at a time, that which was told longest ago.
-    pub fn tell(&mut self, now: Time, interval_ms: u64, counts: bool) -> Effects {
+    /// What is to be told now: one register at a time, that which was told longest ago. With the
+    /// interval of beacons in milliseconds, among so many UAVs that are believed alive.
+    pub fn tell(&mut self, now: Time, (beacon_ms, uavs): (u64, u64), counts: bool) -> Effects {
         let mut effects = Effects::new();
+        let interval_ms = beacon_ms * uavs.div_ceil(UAVS_AN_INTERVAL).max(1);
         let Some(followed) = &self.followed else {
             return effects;
         };

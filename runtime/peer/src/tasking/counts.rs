@@ -55,7 +55,10 @@ impl Tasking {
         }
         let mut effects = self.counting.tell(s.now, interval_ms);
         let counts = !mission.cancelled && !state.stage.ended();
-        effects.extend(self.using.tell(s.now, interval_ms, counts));
+        let uav = |id: u16| s.membership.info(id).is_some_and(|i| !i.ground_station);
+        let others = s.membership.live().filter(|(id, _)| uav(*id)).count();
+        let air = (interval_ms, 1 + others as u64);
+        effects.extend(self.using.tell(s.now, air, counts));
         effects
     }
 

@@ -210,7 +210,7 @@ fn registers_are_told_one_at_a_time_and_merge_in_any_order() {
     let mut told = Vec::new();
     for s in 0..60 {
         let now = Time(71_000 + 1_000 * s);
-        let said = scene.using.tell(now, 1_000, true);
+        let said = scene.using.tell(now, (1_000, 8), true);
         assert!(said.len() <= 1);
         told.extend(said.into_iter().filter_map(|e| match e {
             Effect::Speak(subject, Body::Usage(usage)) => Some((subject, usage)),
@@ -242,6 +242,20 @@ fn registers_are_told_one_at_a_time_and_merge_in_any_order() {
     usage.streets ^= 1;
     other.hear((7, 1), told[0].0, &usage);
     assert_eq!(other.sums(&scene.mission).unwrap().stretches().count(), 0);
+}
+
+#[test]
+fn among_many_each_waits_longer_between_two_registers() {
+    for (uavs, apart_ms) in [(1, 1_000), (8, 1_000), (9, 2_000), (24, 3_000)] {
+        let mut scene = Scene::new(Point::new(100.0, 100.0));
+        scene.look(70.0, &drives);
+        let said = (0..60u64).filter(|s| {
+            let now = Time(371_000 + 1_000 * s);
+            !scene.using.tell(now, (1_000, uavs), true).is_empty()
+        });
+        let at_ms: Vec<u64> = said.map(|s| 1_000 * s).collect();
+        assert_eq!(at_ms, [0, apart_ms], "{uavs}");
+    }
 }
 
 #[test]
