@@ -708,9 +708,10 @@ impl Relay {
             leave_likely(&mut lacking, beacon);
         }
         for (key, _, kind) in lacking {
-            if !self.queue.contains(&key) {
-                self.send_again(now, key, kind);
+            if self.queue.contains(&key) {
+                continue;
             }
+            self.send_again(now, key, kind);
             // Once: whoever hears it now may have passed it on before.
             if let Some(held) = self.held.get_mut(&key).filter(|_| author == self.me) {
                 held.is_passed_on = true;
