@@ -519,12 +519,8 @@ impl Tasking {
         let is_told = is_period || able != self.was_able || turns;
         let offer = (is_told && able).then(|| self.present(s, state)).flatten();
         if is_told {
-            let live = s.membership.live().map(|(id, _)| id);
-            let uav = |id: &u16| {
-                let info = s.membership.info(*id);
-                info.is_some_and(|i| !i.ground_station)
-            };
-            events.push(Event::Live(live.filter(uav).map(PeerId).collect()));
+            let live = s.membership.live_uavs().map(PeerId);
+            events.push(Event::Live(live.collect()));
             events.push(Event::Map(map_of(state)));
             events.push(Event::Cells(is_open));
             events.push(Event::Present(offer.unwrap_or_default()));

@@ -255,7 +255,7 @@ impl ActivityCheck {
         }
         let is_first = last.is_none();
         // And where, whatever came and went between the two.
-        let told = facts.told();
+        let told: BTreeSet<TaskId> = facts.told().collect();
         // What was found is withdrawn, and a moment later found by another: in between it is not.
         let is_replaced = last.is_some_and(|l| l.told.is_disjoint(&told) && !told.is_empty());
         let passing = |key: (MissionEvent, u32), now: Holds| {
@@ -490,14 +490,14 @@ impl Facts<'_> {
     /// Whether it knows of something that its mission looks for. Whether that is there is judged
     /// by a rule of its own.
     fn is_found(&self) -> bool {
-        !self.told().is_empty()
+        self.told().next().is_some()
     }
 
     /// What it knows of that its mission looks for.
-    fn told(&self) -> BTreeSet<TaskId> {
+    fn told(&self) -> impl Iterator<Item = TaskId> {
         let all = self.m.view.detections.iter();
         let told = all.filter(|(_, d)| d.stands == Stands::Told && d.sortie == self.flown.sortie);
-        told.map(|(id, _)| *id).collect()
+        told.map(|(id, _)| *id)
     }
 
     /// To which states one look may lead from there.

@@ -895,6 +895,13 @@ impl Membership {
             .map(|(id, i, _)| (id, i))
     }
 
+    /// The other UAVs not taken for down, by their ids.
+    pub fn live_uavs(&self) -> impl Iterator<Item = u16> + '_ {
+        let live = self.known.iter();
+        let live = live.filter(|(_, k)| k.status != Status::Down && !k.info.ground_station);
+        live.map(|(id, _)| *id)
+    }
+
     /// Something that another peer wrote is heard, by whatever way.
     pub fn note_heard(&mut self, now: Time) {
         self.last_heard = Some(now);

@@ -167,14 +167,16 @@ fn leave_likely(lacking: &mut Vec<(RecordKey, u32, Kind)>, beacon: u32) {
         .drain(..)
         .partition(|(_, _, kind)| digest::is_told(*kind));
     untold.sort_unstable_by_key(|(_, seq, _)| Reverse(*seq));
-    let others = untold.split_off(untold.len().min(NEWEST));
-    let mut turn = Fnv::new();
-    turn.write(&beacon.to_le_bytes());
-    let first = (turn.finish() >> 16).checked_rem(others.len() as u64);
-    let first = first.and_then(|first| usize::try_from(first).ok());
-    let in_turn = others.iter().cycle().skip(first.unwrap_or(0));
+    let mut others = untold.split_off(untold.len().min(NEWEST));
+    if others.len() > NEWEST {
+        let mut turn = Fnv::new();
+        turn.write(&beacon.to_le_bytes());
+        let first = (turn.finish() >> 16) % others.len() as u64;
+        others.rotate_left(usize::try_from(first).unwrap_or(0));
+        others.truncate(NEWEST);
+    }
     left.extend(untold);
-    left.extend(in_turn.take(others.len().min(NEWEST)).copied());
+    left.extend(others);
     left.sort_unstable_by_key(|(key, ..)| *key);
     *lacking = left;
 }

@@ -55,9 +55,7 @@ impl Tasking {
         }
         let mut effects = self.counting.tell(s.now, interval_ms);
         let counts = !mission.cancelled && !state.stage.ended();
-        let uav = |id: u16| s.membership.info(id).is_some_and(|i| !i.ground_station);
-        let others = s.membership.live().filter(|(id, _)| uav(*id)).count();
-        let air = (interval_ms, 1 + others as u64);
+        let air = (interval_ms, 1 + s.membership.live_uavs().count() as u64);
         effects.extend(self.using.tell(s.now, air, counts));
         effects
     }

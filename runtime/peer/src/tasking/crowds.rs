@@ -48,10 +48,8 @@ impl Tasking {
         if !s.speaks {
             return Effects::new();
         }
-        let uav = |id: u16| s.membership.info(id).is_some_and(|i| !i.ground_station);
-        let others = s.membership.live().map(|(id, _)| id).filter(|id| uav(*id));
         let (mut uavs, mut rank) = (1, 0);
-        for id in others {
+        for id in s.membership.live_uavs() {
             uavs += 1;
             rank += u64::from(id < self.me || self.flies.is_none());
         }
