@@ -81,6 +81,9 @@ const QUESTION_SPREAD_MS: u64 = 12;
 /// How often a peer looks at its deadlines, as a fraction of the beacon period.
 pub const CADENCE: u64 = 4;
 
+/// Who stood still for more periods than this does not bid by where it was before.
+const LOST_PERIODS: u64 = 2;
+
 /// The mind of one peer. The contract is at the top of the crate.
 #[derive(Debug)]
 pub struct Peer {
@@ -95,6 +98,9 @@ pub struct Peer {
     outbound: Outbound,
     cooperation: Cooperation,
     percept: Option<Percept>,
+    /// Until then, at the latest, it waits for a percept before it bids: it stood still, and
+    /// knows only where it was before.
+    lost_until: Option<Time>,
     /// The wind, where percepts do not tell it.
     wind: WindEstimate,
     durable: Durable,
@@ -126,6 +132,7 @@ impl Peer {
             outbound: Outbound::new(u64::from(period), &mut timers),
             cooperation: Cooperation::new(&config),
             percept: None,
+            lost_until: None,
             wind: WindEstimate::default(),
             durable: Durable::default(),
             outputs: VecDeque::new(),
@@ -214,6 +221,9 @@ impl Peer {
             self.membership.was_late(self.now, late_ms, slept_ms);
             self.life.was_late(late_ms);
             self.cooperation.was_late(late_ms, &mut self.timers);
+            if slept_ms > LOST_PERIODS * self.period_ms() {
+                self.lost_until = Some(self.now.plus_ms(self.period_ms() / CADENCE));
+            }
         }
     }
 
@@ -257,12 +267,16 @@ impl Peer {
         }
         let percept = self.wind.complete(percept);
         self.percept = Some(percept);
+        let was_lost = self.lost_until.take().is_some();
         let mut effects = self.cooperation.on_percept(self.now, &percept);
         // One airframe is not flown by two.
         if self.life.shares_airframe() {
             effects.retain(|e| !matches!(e, Effect::Fly(_)));
         }
         self.carry_out(effects);
+        if was_lost {
+            self.negotiate();
+        }
     }
 
     fn on_received(&mut self, hops: u8, transmission: &Transmission) {
@@ -566,7 +580,16 @@ impl Peer {
         }
     }
 
+    /// Whether it stood still and has not been told where it is since.
+    fn is_lost(&self) -> bool {
+        self.lost_until.is_some_and(|until| self.now < until)
+    }
+
+    /// Looks at what is to be settled with others, once it knows where it is.
     fn negotiate(&mut self) {
+        if self.is_lost() {
+            return;
+        }
         let (situation, cooperation, timers) = self.situation();
         let effects = cooperation.tick(&situation, timers);
         self.carry_out(effects);

@@ -373,6 +373,40 @@ fn a_clock_that_jumps_takes_nobody_for_dead_and_takes_over_nothing() {
     }
 }
 
+/// Who stood still does not bid by where it was before: it waits for a percept, for a quarter of
+/// a period at most.
+#[test]
+fn who_stood_still_bids_once_it_knows_where_it_is() {
+    let bids = |h: &Harness, id| h.count_said(id, Kind::Bid);
+    // Asleep from each of these moments after the loss of another on.
+    let mut after_ms = [(); 2].map(|()| BTreeSet::new());
+    for (quarters, is_told) in (0..60).flat_map(|q| [(q, false), (q, true)]) {
+        let mut h = Harness::started(3, mission(1, 10, 8));
+        assert!(h.run_until(30, |h| divided(h, &[1, 2, 3])));
+        h.run_s(10);
+        h.stop(3);
+        let asleep_ms = h.now_ms() + 250 * quarters;
+        h.run_until(60, |h| h.now_ms() >= asleep_ms);
+        let mine = bids(&h, 1);
+        h.seat(1).senses = false;
+        h.seat(1).clock_ms += 42_000;
+        h.feed(1, Input::Timer);
+        let woke_ms = h.now_ms();
+        if is_told {
+            let percept = h.seat(1).percept_now();
+            h.feed(1, Input::Percept(percept));
+        }
+        h.run_until(1, |h| bids(h, 1) > mine);
+        let said = &h.seat(1).said;
+        let bid = said
+            .iter()
+            .find(|(at, _, b)| *at >= woke_ms && b.kind() == Kind::Bid);
+        after_ms[usize::from(is_told)].extend(bid.map(|(at, ..)| at - woke_ms));
+    }
+    let [lost_ms, told_ms] = after_ms.map(|ms| ms.first().copied().unwrap());
+    assert!(told_ms < 250 && lost_ms >= 250, "{told_ms} {lost_ms}");
+}
+
 /// UAV 3 hears nobody from now on, and is heard.
 fn deafen(h: &mut Harness, cut: bool) {
     for from in [1, 2] {
