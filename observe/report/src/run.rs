@@ -140,6 +140,13 @@ fn figures(page: &mut Page, r: &RunReport, run: &Run<'_>) {
         ],
         vec!["end".to_owned(), s(r.end_ms), String::new()],
     ];
+    if let Some(ground) = &r.coverage.ground {
+        rows.push(vec![
+            "open ground in sight, past all buildings".to_owned(),
+            format!("{:.1} %", ground.share * 100.0),
+            format!("{} of {} samples", ground.seen, ground.samples),
+        ]);
+    }
     if let Some(live) = &r.live {
         rows.push(vec![
             "time scale reached".to_owned(),

@@ -14,7 +14,7 @@ use crate::check::footprint::FootprintErrors;
 use crate::check::streets::StreetsReport;
 use crate::check::wind::WindErrors;
 use crate::check::{Findings, Violation};
-use crate::world::{Judge, LayerSeen};
+use crate::world::{GroundSeen, Judge, LayerSeen};
 use serde::{Deserialize, Serialize};
 use skein_link::{RadioCounters, Reason};
 use std::collections::{BTreeMap, BTreeSet};
@@ -292,6 +292,10 @@ pub struct Coverage {
     pub uncoverable_cells: Vec<Uncovered>,
     /// Coverable cells that were not seen, by column and row.
     pub missed: Vec<(i16, i16)>,
+    /// How much of the open ground in coverable cells was in sight, past all buildings; none
+    /// where none stand, or no area is to be seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ground: Option<GroundSeen>,
 }
 
 /// A cell that cannot be seen.
@@ -498,6 +502,7 @@ impl Coverage {
             uncoverable,
             uncoverable_cells,
             missed,
+            ground: judge.ground_seen(),
         }
     }
 }

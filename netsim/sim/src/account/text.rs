@@ -115,6 +115,15 @@ impl RunReport {
             write!(f, "; {n} cells not: {reason}")?;
         }
         writeln!(f)?;
+        if let Some(ground) = &c.ground {
+            let hidden = ground.samples - ground.seen;
+            writeln!(
+                f,
+                "  in sight   {:.1} % of the open ground between buildings ({hidden} of {} samples hidden)",
+                ground.share * 100.0,
+                ground.samples
+            )?;
+        }
         write!(f, "  zones      {} entries", self.zone_entries)?;
         if let Some(m) = self.nearest_approach_m {
             write!(f, "; closest approach of two UAVs {m:.1} m")?;

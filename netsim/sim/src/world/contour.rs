@@ -109,7 +109,9 @@ impl Contour {
         obstacles: &Obstacles,
     ) -> Vec<bool> {
         let (places, sight) = (self.places(at_ms).into_iter(), Sight::of(body));
-        places.map(|p| sight.sees(ground(p), obstacles)).collect()
+        places
+            .map(|p| sight.sees(Place::on_ground(p), obstacles))
+            .collect()
     }
 
     /// One look of the detector of a UAV.
@@ -140,7 +142,7 @@ impl Contour {
         let out = all.iter().position(|p| !sight.shows(*p));
         let turned = if sided { out.unwrap_or(0) } else { 0 };
         for p in all.iter().cycle().skip(turned).take(all.len()) {
-            if !sight.sees(ground(*p), obstacles) {
+            if !sight.sees(Place::on_ground(*p), obstacles) {
                 begins = true;
                 continue;
             }
@@ -220,10 +222,6 @@ fn walked(line: &[Point], apart_m: f64, first: f64) -> impl Iterator<Item = Poin
 }
 
 /// A place as cameras see it: a step above the ground.
-fn ground(at: Point) -> Place {
-    Place { at, height_m: 1.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -292,8 +292,7 @@ impl Crowd {
 /// Whether nothing stands between a camera and a square.
 fn is_open(body: &Kinematic, corners: &[Point; 4], obstacles: &Obstacles) -> bool {
     let at = Point::from((corners[0].coords + corners[2].coords) / 2.0);
-    let place = Place { at, height_m: 1.0 };
-    Sight::of(body).sees(place, obstacles)
+    Sight::of(body).sees(Place::on_ground(at), obstacles)
 }
 
 /// How many of so many are recognised, and who is not there besides.

@@ -6,16 +6,17 @@
 use super::board::Board;
 use super::camera::Eye;
 use super::fact::{Approach, Fact};
+use super::ground::{Ground, GroundSeen};
 use super::layers::LayerSeen;
 use super::motion::Piece;
 use super::no_fly::{TurnAway, Zones};
-use super::obstacles::Place;
+use super::obstacles::{Obstacles, Place};
 use super::pieces::Pieces;
 use super::separation::Separation;
 use super::survey::Survey;
 use super::task_board::TaskBoard;
 use skein_flight::coverage::ring::CellId;
-use skein_geometry::frame::Point;
+use skein_geometry::frame::{Point, Pose};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -29,6 +30,7 @@ pub struct Judge {
     zones: Zones,
     separation: Separation,
     tasks: TaskBoard,
+    ground: Option<Ground>,
 }
 
 impl Judge {
@@ -39,6 +41,7 @@ impl Judge {
             zones: Zones::new(survey.zones()),
             separation: Separation::default(),
             tasks: TaskBoard::default(),
+            ground: None,
             boards: vec![Board::new(0, survey)],
         }
     }
@@ -57,6 +60,35 @@ impl Judge {
             self.board_mut().watch_again();
         }
         self
+    }
+
+    /// Takes note of how much of this ground is in sight.
+    #[must_use]
+    pub fn with_ground(mut self, ground: Option<Ground>) -> Self {
+        self.ground = ground;
+        self
+    }
+
+    /// From now on this ground is to be seen; what of it was seen counts.
+    pub fn revise_ground(&mut self, mut ground: Option<Ground>) {
+        if let (Some(new), Some(old)) = (&mut ground, &self.ground) {
+            new.remember(old);
+        }
+        self.ground = ground;
+    }
+
+    /// What is on the ground is looked at from a UAV.
+    pub fn look_at_ground(&mut self, eye: &Eye<'_>, pose: Pose, obstacles: &Obstacles) {
+        if let Some(ground) = &mut self.ground {
+            ground.look(eye, pose, obstacles);
+        }
+    }
+
+    /// How much of the open ground was in sight; none where no buildings stand, or no area is to
+    /// be seen.
+    #[must_use]
+    pub fn ground_seen(&self) -> Option<GroundSeen> {
+        self.ground.as_ref().map(Ground::seen)
     }
 
     /// What came of each lap that is flown in a layer, by the true heights of who looked; nothing

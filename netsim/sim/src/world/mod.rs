@@ -12,6 +12,7 @@ pub(crate) mod detector;
 pub mod fact;
 pub mod fixture;
 pub mod flat;
+pub mod ground;
 pub mod judge;
 mod launcher;
 mod layers;
@@ -27,6 +28,7 @@ pub mod vehicles;
 mod watch;
 
 pub use fact::{Approach, Fact};
+pub use ground::GroundSeen;
 pub use judge::{Judge, Sighting};
 pub use layers::LayerSeen;
 pub use motion::kinematic::Loss;
@@ -38,6 +40,7 @@ use crate::spec::Spec;
 use crate::weather::Weather;
 use contour::Contour;
 use crowd::Crowd;
+use ground::Ground;
 use launcher::Launchers;
 use motion::{Kinematic, Piece};
 use services::Services;
@@ -75,6 +78,8 @@ pub struct Site {
     pub survey: Arc<Survey>,
     /// What peers name cells, where the survey knows other ones.
     pub claims: Option<Arc<pieces::Pieces>>,
+    /// The open ground between the buildings, which nobody has seen yet.
+    open: Option<Ground>,
 }
 
 impl Site {
@@ -82,9 +87,12 @@ impl Site {
     /// if it gave any.
     #[must_use]
     pub fn new(spec: &Spec, geometry: Option<&MissionGeometry>) -> Self {
+        let obstacles = Obstacles::new(&spec.buildings);
+        let survey = Arc::new(Survey::new(spec));
         Self {
-            obstacles: Obstacles::new(&spec.buildings),
-            survey: Arc::new(Survey::new(spec)),
+            open: Ground::of(&survey, &spec.mission, &obstacles),
+            obstacles,
+            survey,
             claims: claims(&spec.mission, geometry),
         }
     }
@@ -225,7 +233,8 @@ impl World {
         let judge = Judge::new(Arc::clone(&site.survey))
             .with_claims(site.claims.clone())
             .with_laps(spec.mission.further_laps.saturating_add(1))
-            .with_watch(spec.mission.goes_round());
+            .with_watch(spec.mission.goes_round())
+            .with_ground(site.open.clone());
         let mut launchers = Launchers::of(spec);
         if let Some(launchers) = &mut launchers {
             launchers.hold(0, &mut uavs, &mut Vec::new());
@@ -341,6 +350,8 @@ impl World {
     pub fn revise(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
         let mission = &*geometry.mission;
         let claims = claims(mission, Some(geometry));
+        let ground = Ground::of(&survey, mission, &self.site.obstacles);
+        self.judge.revise_ground(ground);
         self.judge.revise(
             survey,
             (
@@ -499,8 +510,7 @@ impl World {
     /// Whether nothing stands between a place on the ground and a camera.
     #[must_use]
     pub fn is_open_from(&self, eye: Place, at: skein_geometry::frame::Point) -> bool {
-        let place = Place { at, height_m: 1.0 };
-        self.site.obstacles.sees(eye, place)
+        self.site.obstacles.sees(eye, Place::on_ground(at))
     }
 
     /// The vehicles on the ground, as they are.
@@ -666,6 +676,10 @@ impl World {
                 });
             } else if u.body.takes_off_in_ms(to_ms) == 0 {
                 self.airborne.push((u.id, place_of(&u.body)));
+                if to_ms.is_multiple_of(ground::LOOK_MS) {
+                    let (eye, pose) = (u.body.eye(), u.body.pose());
+                    self.judge.look_at_ground(&eye, pose, &self.site.obstacles);
+                }
             }
         }
         self.vehicles.drive(to_ms, &self.airborne);

@@ -22,7 +22,27 @@ pub struct Place {
     pub height_m: f64,
 }
 
+/// What is on the ground is seen by so much of it, metres: the middle of a person or a car.
+const STANDS_M: f64 = 1.0;
+
+/// Above all buildings, metres.
+const SKY_M: f64 = 10_000.0;
+
 impl Place {
+    /// Of what is on the ground.
+    #[must_use]
+    pub fn on_ground(at: Point) -> Self {
+        let height_m = STANDS_M;
+        Self { at, height_m }
+    }
+
+    /// Above all buildings.
+    #[must_use]
+    pub fn in_the_sky(at: Point) -> Self {
+        let height_m = SKY_M;
+        Self { at, height_m }
+    }
+
     /// Distance in space, metres.
     #[must_use]
     pub fn distance_m(&self, other: &Self) -> f64 {
