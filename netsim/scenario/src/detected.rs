@@ -202,6 +202,32 @@ fn when_who_watches_what_was_found_is_killed_another_is_given_it_though_all_are_
     );
 }
 
+/// The only UAV stands still while the convoy leaves: it looks for it along the road that it is to
+/// see, and not about the place where it was.
+#[test]
+fn a_convoy_that_has_left_is_caught_up_with_along_its_road() {
+    let prepared = prepared("convoy", 1);
+    let faults = vec![
+        TimedFault {
+            at_ms: 835,
+            fault: Fault::Pause { peer: 1 },
+        },
+        TimedFault {
+            at_ms: 48_000,
+            fault: Fault::Resume { peer: 1 },
+        },
+    ];
+    for seed in 1..4 {
+        let outcome = run(&prepared, seed, faults.clone(), Wanted::default());
+        passed(&outcome);
+        let task = &outcome.report.tasks[0];
+        let seen = task.tracked.as_ref().unwrap();
+        // 270 m ahead by then, at 5 m/s; 14.5 m/s come up to it in half a minute.
+        assert!(seen.first_ms.unwrap() < 48_000 + 50_000, "{}", task.line());
+        assert!(seen.sight_ms * 10 > seen.wanted_ms * 7, "{}", task.line());
+    }
+}
+
 #[test]
 fn a_convoy_is_escorted_by_one_uav_and_of_many() {
     for uavs in [1, 3, 8] {

@@ -134,6 +134,13 @@ impl Streets {
         (!pieces.is_empty()).then_some(Self { pieces })
     }
 
+    /// Length of all streets, metres.
+    #[must_use]
+    pub fn length_m(&self) -> f64 {
+        // Each piece is there twice, once a way.
+        self.pieces.iter().map(|p| p.length_m).sum::<f64>() / 2.0
+    }
+
     /// How many pieces there are, each way counted.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -5,14 +5,17 @@
 //! | event | what follows |
 //! |---|---|
 //! | a vehicle is seen to drive, by whomever | there is a way |
-//! | whom it follows is lost | chances begin where it was seen last: on the streets, where it was on one that is known |
+//! | whom it follows is lost | chances begin where it was seen last: on the streets, where it was on one that is known; where none are, on the lines that the mission asks for, where it was on one |
+//! | it was looked for on lines for twice as long as a flight along all of them takes, or for five minutes | chances begin anew, anywhere: a line need be no road |
 //! | nobody has seen it yet | likewise, about the task's place since it was asked for |
 //! | a second passes | chance drives on; what is in view is less likely; where to look next is chosen |
 //! | where it flies to stays out of view for longer than the way there takes | that is given up |
 //! | it is seen again, or seen by another later | the chances are dropped |
 
 use super::{Fused, INNER, Sought, Targets, standing};
+use crate::mission::{PointMm, point_m};
 use crate::sight::Sight;
+use crate::task::CoverageTask;
 use skein_behaviors::Percept;
 use skein_flight::tracking::chance::ChanceMap;
 use skein_flight::tracking::follower::TargetMotion;
@@ -49,12 +52,20 @@ const PATIENCE: f64 = 1.5;
 const PATIENCE_S: f64 = 15.0;
 const GIVEN_UP_M: f64 = 40.0;
 
+/// On the lines of a mission a target is looked for no longer than for so many flights along all of
+/// them and so many seconds more, and no longer than that, seconds.
+const FLIGHTS: f64 = 2.0;
+const FLIGHTS_S: f64 = 60.0;
+const ON_LINES_S: f64 = 300.0;
+
 /// A search for a target that is out of sight.
 #[derive(Clone, Debug)]
 pub(super) struct Search {
     /// For which task, and when the target was seen last.
     of: (Sought, u64),
     chances: Chances,
+    /// The lines of the mission, where it is looked for on these, and until when, milliseconds.
+    lines: Option<(Streets, u64)>,
     looked_ms: u64,
     /// Where to fly.
     aim: Option<Point>,
@@ -143,6 +154,7 @@ impl Targets {
         &mut self,
         (sought, place, asked_s): (Sought, Point, f64),
         percept: &Percept,
+        asks_for: &CoverageTask,
         may_fly: &dyn Fn(Point) -> bool,
     ) -> Option<TargetMotion> {
         let airframe = self.flies?;
@@ -157,24 +169,38 @@ impl Targets {
         };
         let streets = town.and_then(|t| t.streets.as_ref());
         let goes_on = self.search.take().filter(|s| s.of == (sought, since_ms));
-        let mut search = goes_on.unwrap_or_else(|| {
-            let seen = last_seen(last, place, self.now_ms, asked_s);
-            let on_streets = streets.and_then(|s| StreetChances::new(s, &seen));
-            let on_ground = || match first_map(&seen) {
+        let seen = last_seen(last, place, self.now_ms, asked_s);
+        let on_ground = || {
+            Chances::Ground(Box::new(match first_map(&seen) {
                 map if ways.is_empty() => map,
                 map => map.on_ways(&is_driven),
-            };
-            let chances = on_streets.map_or_else(
-                || Chances::Ground(Box::new(on_ground())),
-                |chances| Chances::Streets(chances, u64::MAX),
-            );
+            }))
+        };
+        let mut search = goes_on.unwrap_or_else(|| {
+            let lines = streets.is_none().then(|| streets_of(asks_for)).flatten();
+            let on = streets.or(lines.as_ref());
+            let chances = on.and_then(|streets| StreetChances::new(streets, &seen));
+            let lines = lines.filter(|_| chances.is_some()).map(|lines| {
+                let flight_s = lines.length_m() / airframe.cruise_mps.max(1.0);
+                let lasts_s = (FLIGHTS * flight_s + FLIGHTS_S).min(ON_LINES_S);
+                (lines, self.now_ms + whole_ms(lasts_s))
+            });
+            let on_streets = |chances| Chances::Streets(chances, u64::MAX);
             Search {
                 of: (sought, since_ms),
-                chances,
+                chances: chances.map_or_else(on_ground, on_streets),
+                lines,
                 looked_ms: 0,
                 aim: None,
             }
         });
+        if search
+            .lines
+            .as_ref()
+            .is_some_and(|(_, until_ms)| *until_ms <= self.now_ms)
+        {
+            (search.lines, search.chances) = (None, on_ground());
+        }
         if search.looked_ms + LOOK_MS <= self.now_ms {
             search.looked_ms = self.now_ms;
             let sight = Sight::of(percept, &airframe, town);
@@ -189,7 +215,8 @@ impl Targets {
                 pictures: &|p| sight.view.shows(p, INNER),
                 may_fly,
             };
-            search.aim = search.chances.go_on(streets, &by, search.aim);
+            let lines = search.lines.as_ref().map(|(lines, _)| lines);
+            search.aim = search.chances.go_on(streets.or(lines), &by, search.aim);
         }
         let aim = search.aim;
         self.search = Some(search);
@@ -200,6 +227,16 @@ impl Targets {
     pub fn end_search(&mut self) {
         self.search = None;
     }
+}
+
+/// The lines of a mission as streets; none where it asks for none.
+fn streets_of(asks_for: &CoverageTask) -> Option<Streets> {
+    let CoverageTask::Lines(lines) = asks_for else {
+        return None;
+    };
+    let line = |way: &[PointMm]| way.iter().copied().map(point_m).collect();
+    let lines: Vec<Vec<Point>> = lines.iter().map(|l| line(&l.way)).collect();
+    Streets::of(&lines)
 }
 
 /// The square of a way at a place.

@@ -1,6 +1,7 @@
 //! Targets of two peers that see, tell and hear.
 
 use super::*;
+use crate::task::{CoverageTask, LineTask};
 use skein_behaviors::sightings::{Sighted, Sightings};
 use skein_flight::tracking::buildings::{Building, Buildings};
 use skein_flight::tracking::streets::Streets;
@@ -181,7 +182,7 @@ fn who_is_lost_is_looked_for_all_over_and_taken_up_again_where_it_may_be() {
         }
         let looked_for = (TASK, Point::new(125.0, 50.0), 9.0);
         let aim = one
-            .look_for(looked_for, &looked, &|p| p.y > -200.0)
+            .look_for(looked_for, &looked, &CoverageTask::Area, &|p| p.y > -200.0)
             .unwrap();
         assert!(aim.position.y > -200.0 && aim.velocity_mps.norm() < 1e-9);
         if places.last() != Some(&aim.position) {
@@ -210,7 +211,7 @@ fn who_is_lost_is_looked_for_all_over_and_taken_up_again_where_it_may_be() {
     let looked = percept(9_000, Point::origin(), &[]);
     other.on_percept(&looked);
     let place = Point::new(300.0, 300.0);
-    let aim = other.look_for((TASK, place, 4.0), &looked, &|_| true);
+    let aim = other.look_for((TASK, place, 4.0), &looked, &CoverageTask::Area, &|_| true);
     assert!((aim.unwrap().position - place).norm() < 100.0);
 }
 
@@ -249,7 +250,8 @@ fn who_is_lost_where_streets_are_told_is_looked_for_along_them_and_given_up_wher
             continue;
         }
         let looked_for = (TASK, Point::new(125.0, 50.0), 9.0);
-        let aim = one.look_for(looked_for, &looked, &|_| true).unwrap();
+        let aim = one.look_for(looked_for, &looked, &CoverageTask::Area, &|_| true);
+        let aim = aim.unwrap();
         let to = aim.position - at;
         at += to * (2.8 / to.norm().max(2.8));
         let p = aim.position;
@@ -263,6 +265,41 @@ fn who_is_lost_where_streets_are_told_is_looked_for_along_them_and_given_up_wher
     let goes = |is_there: &dyn Fn(&Point) -> bool| places.iter().any(is_there);
     assert!(places[0].x > 130.0, "ahead first: {:?}", places[0]);
     assert!(goes(&|p| p.x > 400.0) && places.len() > 8, "{places:?}");
+}
+
+/// Nobody has seen it yet: it was to be on a line of the mission, and drives along that; or it was
+/// not, or no longer.
+#[test]
+fn who_was_to_be_on_a_line_of_the_mission_is_looked_for_along_it_and_then_anywhere() {
+    let way = vec![(0, 50_000), (1_000_000, 50_000)];
+    let line = LineTask {
+        way,
+        width_mm: 8_000,
+    };
+    let asks_for = CoverageTask::Lines(vec![line]);
+    let looked_for = |place: Point| {
+        let mut one = targets(1);
+        let mut at = Point::new(-200.0, 0.0);
+        let mut places = Vec::<(u64, Point)>::new();
+        for now_ms in (1_000..500_000).step_by(200) {
+            let looked = percept(now_ms, at, &[]);
+            one.on_percept(&looked);
+            let aim = one.look_for((TASK, place, 60.0), &looked, &asks_for, &|_| true);
+            let aim = aim.unwrap().position;
+            at += (aim - at) * (2.8 / (aim - at).norm().max(2.8));
+            places.push((now_ms, aim));
+        }
+        places
+    };
+    let is_beside = |p: Point| (p.y - 50.0).abs() > 30.0 || p.x < -30.0 || p.x > 1_030.0;
+    // The line and back, at 13 m/s, and a minute.
+    let on_line = looked_for(Point::new(20.0, 60.0));
+    let left = on_line.iter().find(|(_, p)| is_beside(*p));
+    let left_ms = left.unwrap().0;
+    assert!(left_ms > 214_000, "{left_ms}");
+    assert!(on_line.iter().any(|(_, p)| p.x > 900.0));
+    let off_line = looked_for(Point::new(20.0, 200.0));
+    assert!(is_beside(off_line[0].1), "{:?}", off_line[0]);
 }
 
 /// Who stands behind a house is not missed by who looks past it.

@@ -192,7 +192,9 @@ impl Tasking {
                 (near || inside) && (p - base).norm() <= reach_m
             };
             let looked_for = (sought, place, asked_s);
-            let next = self.targets.look_for(looked_for, percept, &may_fly);
+            let next = self
+                .targets
+                .look_for(looked_for, percept, &mission.task, &may_fly);
             next.unwrap_or(followed.motion)
         } else {
             self.targets.end_search();
