@@ -196,6 +196,7 @@ fn can_be_flown(mission: &Mission, spec: &Spec) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
+    use super::Survey;
     use crate::{Files, Overrides};
     use std::path::PathBuf;
 
@@ -209,6 +210,28 @@ mod tests {
         let beside = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/trials"));
         let (files, over) = (Files::Directory(beside), Overrides::default());
         crate::parse_with("s.json5", &text, &files, &over).map_err(|e| e.to_string())
+    }
+
+    /// A zone beside a road with two lanes, of which one picture shows pieces of both.
+    #[test]
+    fn a_zone_is_added_to_a_mission_for_lines_where_all_is_still_seen() {
+        let text = include_str!("../../../../configs/trials/convoy.json5");
+        let lanes = "[[60, 70], [340, 120], [620, 230]], [[60, 60], [340, 110]";
+        let text = text.replacen("[[60, 60], [340, 110]", lanes, 1);
+        let zone = "circle: { east_m: 600, north_m: 0, radius_m: 12 }";
+        let added = format!("[{{ at_s: 60, nfz_add: {{ id: 'a', zone: {{ {zone} }} }} }}]");
+        let text = text.replacen("faults: []", &format!("faults: [], operator: {added}"), 1);
+        let (files, over) = (Files::Directory(PathBuf::new()), Overrides::default());
+        let read = crate::parse_with("s.json5", &text, &files, &over).map_err(|e| e.to_string());
+        let (spec, geometry) = read.map(|s| (s.spec, s.geometry)).unwrap();
+        let survey = Survey::new(&spec);
+        assert!(survey.n_coverable() > geometry.coverage_loop.len());
+        let planned = survey.clone().as_planned(&geometry);
+        assert_eq!(planned.n_coverable(), survey.n_coverable());
+        // The loop of a mission for one lane leaves out the other one.
+        let one = crate::load_builtin("convoy", &over).unwrap();
+        let left_out = survey.left_out(&one.geometry);
+        assert!((5..planned.n_coverable()).contains(&left_out), "{left_out}");
     }
 
     #[test]

@@ -196,12 +196,28 @@ impl Survey {
         self
     }
 
-    /// Whether the loop serves a cell: of an area one that is to be seen, of places and lines a
-    /// piece that has a station. Of straight passes the judge has squares of its own: one is left
-    /// out whose middle lies in pieces of passes that have no station, and in no other.
+    /// Whether the loop serves a cell: of an area one that is to be seen, of places one that has a
+    /// station. A station of lines may be of several pieces: one of them has to hold the piece
+    /// whole. Of straight passes the judge has squares of its own: one is left out whose middle
+    /// lies in pieces of passes that have no station, and in no other.
     fn is_planned(&self, geometry: &MissionGeometry, id: CellId) -> bool {
         let coverage_loop = &geometry.coverage_loop;
-        if geometry.mission.task.is_area() || self.pieces.is_some() {
+        let task = &geometry.mission.task;
+        if let (CoverageTask::Lines(_), Some(pieces)) = (task, &self.pieces) {
+            let ring = id.number().and_then(|n| pieces.rings().get(usize::from(n)));
+            let Some(ring) = ring else {
+                return false;
+            };
+            let middle = ring[0] + (ring[2] - ring[0]) / 2.0;
+            // A hair smaller, for stations end where their pieces do.
+            let inner = ring.map(|corner| middle + (corner - middle) * 0.99);
+            let holds = |station: CellId| {
+                let corners = coverage_loop.patches().corners(station);
+                corners.is_some_and(|corners| inner.iter().all(|p| in_ring(*p, &corners)))
+            };
+            return coverage_loop.cells().iter().any(|c| holds(c.id));
+        }
+        if task.is_area() || self.pieces.is_some() {
             let cell = coverage_loop.index_of(id);
             let cell = cell.and_then(|c| coverage_loop.cells().get(usize::from(c)));
             return cell.is_some_and(|c| c.needed);
