@@ -35,8 +35,6 @@ pub type PointMm = (i32, i32);
 /// same everywhere.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Mission {
-    /// Counts the operator's changes; a later one replaces an earlier one.
-    pub revision: u32,
     /// Latitude of the origin, 1e-7 degrees.
     pub origin_lat_e7: i32,
     /// Longitude of the origin, 1e-7 degrees.
@@ -59,17 +57,9 @@ pub struct Mission {
     pub tracking_error_mm: u32,
     /// A launch point, which must reach the loop.
     pub launch: PointMm,
-    /// Where UAVs loiter when all is done.
-    pub base: PointMm,
     /// What is to be seen.
     #[serde(default, skip_serializing_if = "CoverageTask::is_area")]
     pub task: CoverageTask,
-    /// Which lap it is, from 0 (D2.7 §3.6.6: continuous coverage).
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub lap: u16,
-    /// How many more times everything is to be seen after this one.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub further_laps: u16,
     /// Which spanning tree the lanes of an area follow: whoever makes the mission knows
     /// the wind and chooses.
     #[serde(default, skip_serializing_if = "Tree::is_default")]
@@ -84,16 +74,6 @@ pub struct Mission {
     /// The fastest cruise of the fleet, mm/s; of use with a separation alone.
     #[serde(default, skip_serializing_if = "is_default")]
     pub fastest_mmps: u32,
-    /// No-fly zones that the operator added in flight, by name; besides `zones`.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub added_zones: BTreeMap<String, Vec<PointMm>>,
-    /// Counts the missions that the operator began anew: nothing that was covered in an
-    /// earlier one counts.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub sortie: u16,
-    /// Whether the operator ended it: nothing is to be seen, and all fly home.
-    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
-    pub cancelled: bool,
     /// What a UAV does in it when; [`Diagram::coverage`] where none is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub diagram: Option<Arc<Diagram>>,
@@ -118,6 +98,28 @@ pub struct Mission {
     /// What may hide whom somebody follows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub buildings: Option<Arc<Buildings>>,
+    // What an operator changes in flight stands last, so that most pieces of the next revision are
+    // as they were (decision 139).
+    /// Where UAVs loiter when all is done.
+    pub base: PointMm,
+    /// Which lap it is, from 0 (D2.7 §3.6.6: continuous coverage).
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub lap: u16,
+    /// How many more times everything is to be seen after this one.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub further_laps: u16,
+    /// No-fly zones that the operator added in flight, by name; besides `zones`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub added_zones: BTreeMap<String, Vec<PointMm>>,
+    /// Counts the missions that the operator began anew: nothing that was covered in an
+    /// earlier one counts.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub sortie: u16,
+    /// Whether the operator ended it: nothing is to be seen, and all fly home.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub cancelled: bool,
+    /// Counts the operator's changes; a later one replaces an earlier one.
+    pub revision: u32,
 }
 
 /// Whether a field need not be said.
@@ -770,6 +772,10 @@ impl Library {
         pieces.insert(index, chunk.clone());
         self.latest = Some(key);
         if pieces.len() < usize::from(chunk.chunks) {
+            if let Some(mission) = self.filled(key, index) {
+                self.offer(Arc::new(mission));
+                return Ok(true);
+            }
             while self.partial.len() > MAX_PARTIAL {
                 self.partial.pop_first();
             }
@@ -791,6 +797,35 @@ impl Library {
         self.offer(Arc::new(mission));
         Ok(true)
     }
+
+    /// The mission of which a piece came, where those that came and, for the others, the pieces of
+    /// the mission that is held give what its hash says: most of a revision is as it was before.
+    fn filled(&self, key: (u32, u64), came: u16) -> Option<Mission> {
+        let pieces = self.partial.get(&key)?;
+        let held = chunks(self.whole.as_ref()?).ok()?;
+        let is_as_before = |i: u16| {
+            let before = held.get(usize::from(i)).map(|piece| &piece.bytes);
+            pieces.get(&i).map(|piece| &piece.bytes) == before
+        };
+        // A piece that is as before completes nothing that the one before it did not.
+        if is_as_before(came) {
+            return None;
+        }
+        let mut bytes = Vec::new();
+        for i in 0..pieces.get(&came)?.chunks {
+            let piece = pieces.get(&i).or_else(|| held.get(usize::from(i)))?;
+            bytes.extend_from_slice(&piece.bytes);
+        }
+        let mission: Mission = cbor4ii::serde::from_slice(&bytes).ok()?;
+        (mission.content_hash() == key.1 && mission.revision == key.0).then_some(mission)
+    }
+}
+
+/// Of how many pieces the nearer end of a mission is away: what changes from one revision to the
+/// next is at its ends, so they go first.
+#[must_use]
+pub fn pieces_from_end(index: u16, count: u16) -> u16 {
+    index.min(count.saturating_sub(1).saturating_sub(index))
 }
 
 #[cfg(test)]
@@ -845,6 +880,67 @@ mod tests {
             assert_eq!(done, i == 0);
         }
         assert_eq!(*library.newest().unwrap(), m);
+    }
+
+    /// What an operator changes in flight is at the ends of a mission: who holds the revision before
+    /// needs these pieces alone, in any order.
+    #[test]
+    fn who_holds_the_revision_before_needs_what_is_new() {
+        let before = mission(1, 500);
+        let all = |m: &Mission| chunks(m).unwrap();
+        let held = all(&before);
+        let zone = (0..32).map(|n| (n * 1_000_000, n * n * 1_000)).collect();
+        let changed = [
+            Mission {
+                base: (7, 8),
+                ..before.clone()
+            },
+            Mission {
+                cancelled: true,
+                ..before.clone()
+            },
+            Mission {
+                lap: 1,
+                further_laps: 3,
+                ..before.clone()
+            },
+            Mission {
+                added_zones: [("fire".to_owned(), zone)].into(),
+                ..before.clone()
+            },
+        ];
+        for next in changed {
+            let next = Mission {
+                revision: 2,
+                ..next
+            };
+            let pieces = all(&next);
+            let new = (0u16..).zip(&pieces).filter(|(i, piece)| {
+                held.get(usize::from(*i))
+                    .is_none_or(|h| h.bytes != piece.bytes)
+            });
+            let mut new: Vec<(u16, &MissionChunk)> = new.collect();
+            assert!((1..=5).contains(&new.len()) && pieces.len() > 12);
+            assert!(new.iter().all(|(i, p)| pieces_from_end(*i, p.chunks) < 3));
+            for _ in 0..2 {
+                let mut library = Library::new(Some(Arc::new(before.clone())));
+                // One that is as before brings nothing.
+                assert_eq!(library.chunk(6, &pieces[6]), Ok(false));
+                let done = new.iter().map(|(i, piece)| library.chunk(*i, piece));
+                assert_eq!(done.filter(|done| *done == Ok(true)).count(), 1);
+                assert_eq!(*library.newest().unwrap(), next);
+                assert_eq!(library.lacking(1).unwrap().2, Vec::<u8>::new());
+                new.reverse();
+            }
+            // Who holds another one collects them all.
+            let mut other = before.clone();
+            other.area.reverse();
+            let mut library = Library::new(Some(Arc::new(other)));
+            for (i, piece) in &new {
+                assert_eq!(library.chunk(*i, piece), Ok(false));
+            }
+            assert_eq!(library.newest().unwrap().revision, 1);
+        }
     }
 
     #[test]

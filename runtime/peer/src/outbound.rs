@@ -27,7 +27,7 @@ use crate::config::Role;
 use crate::coverage_told::CoverageTold;
 use crate::effect::{Effect, Effects};
 use crate::input::Time;
-use crate::mission::{Mission, chunks, mm};
+use crate::mission::{Mission, chunks, mm, pieces_from_end};
 use crate::mission_state::MissionState;
 use crate::output::Report;
 use crate::timers::{Timer, Timers};
@@ -252,10 +252,12 @@ impl Outbound {
         }
         self.mission_said = Some(hash);
         match chunks(mission) {
-            Ok(pieces) => (0u16..)
-                .zip(pieces)
-                .map(|(subject, chunk)| Effect::Speak(subject, Body::Mission(chunk)))
-                .collect(),
+            Ok(pieces) => {
+                let mut pieces: Vec<_> = (0u16..).zip(pieces).collect();
+                pieces.sort_by_key(|(subject, chunk)| pieces_from_end(*subject, chunk.chunks));
+                let speak = |(subject, chunk)| Effect::Speak(subject, Body::Mission(chunk));
+                pieces.into_iter().map(speak).collect()
+            }
             Err(too_large) => vec![Effect::Alarm(too_large.to_string())],
         }
     }

@@ -17,7 +17,7 @@
 //! | less of an author than a neighbour's beacon shows, or other versions | that beacon is heard | one of the next beacons tells of that author, so that who has them says them again |
 //! | pieces of a mission | pieces of a newer one of its author come | held until that one is whole and followed; said again once no more of it come (the module `pieces`) |
 //! | a piece of a mission | a neighbour lacks it: its beacon, the last ten intervals considered, shows an older revision, and it says no pieces of that mission or this one; else it only is held | passed on, or sent again as to who lacks it |
-//! | a piece of a mission | it is due | of all that wait goes first what was never on the air, then what most lack, what nobody passed on, what was on the air longest ago |
+//! | a piece of a mission | it is due | of all that wait goes first what is new in a revision, until somebody passes it on or it was said eight times, then what was never on the air, then what most lack, what nobody passed on, what was on the air longest ago |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
 //! | this peer's own bid, claim or order | it was sent, and nobody is heard passing it on | sent again, twice at most |
 //! | waiting | the share allows it, it is this peer's own bid or claim and was not sent yet, or nothing is due earlier | sent |
@@ -33,6 +33,7 @@
 
 use crate::Incarnation;
 use crate::input::Time;
+use crate::mission::pieces_from_end;
 use crate::output::Priority;
 use crate::protocol::airtime::{Airtime, LASTING_INTERVALS};
 use crate::wire::codec::{self, Body};
@@ -88,6 +89,9 @@ const REPEAT_DELAYS: u64 = 2;
 
 /// Even in small swarms the random times are those of so many.
 const LEAST_SPREAD: u64 = 8;
+
+/// What is new in a revision goes before its other pieces until this peer has said it so often.
+const PRESSED_TIMES: u8 = 8;
 
 /// A piece of a mission takes as long as this of a peer's share, in intervals: each one that
 /// waits is due so much later, and what is said meanwhile goes before it.
@@ -204,6 +208,11 @@ struct Held {
     mission: Option<Mission>,
     /// How many pieces that mission has.
     pieces: u16,
+    /// Whether it is a piece that the revisions before, of which pieces are held, have not at its
+    /// place.
+    changed: bool,
+    /// How often this peer said it.
+    said: u8,
     /// When this version came.
     came: Time,
     /// How many neighbours told since it was last on the air that they lack this piece.
@@ -212,17 +221,29 @@ struct Held {
     sent: Time,
 }
 
-/// Whether it was on the air, how many lack it, whether anybody passed it on, and when it was on
-/// the air last.
-type Turn = (bool, Reverse<usize>, bool, Time);
+/// Whether it presses no more, whether it was on the air, how many lack it, whether anybody passed
+/// it on, and when it was on the air last; and how far it is from the nearer end of its mission.
+type Turn = (bool, bool, Reverse<usize>, bool, Time, u16);
 
 impl Held {
-    /// Among pieces: first what nobody can have, then what most lack, of those what nobody was
-    /// heard passing on, and what was on the air longest ago. Pieces that waited in vain till their lifetime was over would else wait
-    /// behind the same ones again, for ever.
-    fn turn(&self) -> Turn {
+    /// Among pieces: first what is new in this revision, until it was said a few times or passed on:
+    /// with it who holds the revision before has all. Then what nobody can have, then what most lack, of those what nobody was
+    /// heard passing on, and what was on the air longest ago. Pieces that waited in vain till their
+    /// lifetime was over would else wait behind the same ones again, for ever. Then the ends of a
+    /// mission, where most of what is new is.
+    fn turn(&self, key: &RecordKey) -> Turn {
         let lack = Reverse(self.lack);
-        (self.copies > 0, lack, self.is_passed_on, self.sent)
+        let from_end = pieces_from_end(key.2, self.pieces);
+        let presses = self.changed && !self.is_passed_on && self.said < PRESSED_TIMES;
+        let is_said = self.copies > 0;
+        (
+            !presses,
+            is_said,
+            lack,
+            self.is_passed_on,
+            self.sent,
+            from_end,
+        )
     }
 }
 
@@ -292,6 +313,8 @@ impl Relay {
                 repeats: if vital { REPEATS } else { 0 },
                 mission,
                 pieces,
+                changed: self.is_changed(&key, piece.as_ref()),
+                said: 0,
                 came: now,
                 lack: 0,
                 sent: now,
@@ -349,6 +372,8 @@ impl Relay {
             repeats: 0,
             mission,
             pieces,
+            changed: self.is_changed(&key, piece.as_ref()),
+            said: 0,
             came: now,
             lack: 0,
             sent: now,
@@ -603,7 +628,7 @@ impl Relay {
             let said = (held.copies > 0).then(|| held.sent.plus_ms(on_the_way_ms));
             held.lack = self.wants.lacking(now, (mission, key.2), said);
             if held.lack > 0 && !self.queue.contains(key) {
-                lacking.push((held.turn(), *key));
+                lacking.push((held.turn(key), *key));
             }
         }
         lacking.sort_unstable();
@@ -767,6 +792,7 @@ impl Relay {
         held.lack = 0;
         held.sent = now;
         held.copies = held.copies.saturating_add(1);
+        held.said = held.said.saturating_add(1);
         let out = Out {
             key: key::key(&self.fleet, kind, key.2, key.0),
             bytes: held.bytes.clone(),
@@ -781,6 +807,19 @@ impl Relay {
             self.wait(now, key, kind, delay_ms);
         }
         Some(out)
+    }
+
+    /// Whether a piece is new in its revision: pieces of an earlier one are held, and what it has
+    /// at its place is not this.
+    fn is_changed(&self, key: &RecordKey, piece: Option<&MissionChunk>) -> bool {
+        let Some(piece) = piece else {
+            return false;
+        };
+        let (from, to) = ((key.0, key.1, 0, 0), (key.0, key.1, u16::MAX, 0));
+        let is_revised = self.held.range(from..to).any(|(k, _)| k.3 < key.3);
+        let earlier = self.held.range((key.0, key.1, key.2, 0)..*key);
+        let mut earlier = earlier.filter_map(|(_, h)| piece_of(Kind::Mission, &h.record));
+        is_revised && !earlier.any(|e| e.bytes == piece.bytes)
     }
 
     /// The piece that goes next from what neighbours lent, and its bytes.

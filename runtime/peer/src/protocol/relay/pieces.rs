@@ -98,7 +98,7 @@ impl Relay {
     /// missions one of that which was on the air longest ago.
     pub(super) fn first_piece(&self, now: Time) -> Option<RecordKey> {
         let waiting = || self.queue.ripe_pieces(now);
-        let turn = |key: &RecordKey| (self.held.get(key).map(super::Held::turn), *key);
+        let turn = |key: &RecordKey| (self.held.get(key).map(|held| held.turn(key)), *key);
         let first = mission_key(&waiting().next()?);
         let mut alone = true;
         // As a rule they are all of one mission, and one look is enough.

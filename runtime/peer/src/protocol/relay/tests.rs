@@ -328,6 +328,51 @@ fn the_former_mission_is_said_once_the_newer_one_comes_no_more() {
     assert!(later.into_iter().all(|byte| byte >= 30));
 }
 
+/// Of the next revision one piece in the middle is new: it goes before the others, until somebody
+/// passes it on or it was on the air a few times.
+#[test]
+fn what_is_new_in_a_revision_goes_before_what_is_as_it_was() {
+    for passed_on in [true, false] {
+        let mut r = relay(2);
+        r.follow(Time(4_000), 1);
+        let hear = |r: &mut Relay, now_ms: u64, (revision, subject): (u32, u16), byte: u8| {
+            let chunk = MissionChunk {
+                revision,
+                content_hash: u64::from(revision),
+                chunks: 40,
+                bytes: vec![byte; 180],
+            };
+            let record = Record {
+                seq: revision * 100 + u32::from(subject),
+                body: codec::encode_body(&Body::Mission(chunk)),
+                ..piece(subject, 40)
+            };
+            let said = [u8::try_from(subject).unwrap(); 200];
+            r.offer(Time(now_ms), &record, &said, 0)
+        };
+        for subject in 0..40 {
+            assert_eq!(hear(&mut r, 5_000, (1, subject), 1), Offer::New);
+        }
+        for subject in 0..40 {
+            let byte = if subject == 20 { 2 } else { 1 };
+            assert_eq!(hear(&mut r, 6_000, (2, subject), byte), Offer::New);
+        }
+        let passes = |r: &mut Relay, t: u64| {
+            if passed_on && t == 8_001 {
+                hear(r, t, (2, 20), 2);
+            }
+        };
+        let times: [u32; 40] = pieces_sent(&mut r, 8_000..80_000, (2000, 60), passes);
+        let others = times.iter().enumerate().filter(|(i, _)| *i != 20);
+        let most = others.map(|(_, n)| *n).max().unwrap();
+        if passed_on {
+            assert!(times[20] <= most, "{times:?}");
+        } else {
+            assert!((8..11).contains(&times[20]) && most < 4, "{times:?}");
+        }
+    }
+}
+
 /// Made-up revisions and those of long ago, in any order.
 #[test]
 fn of_an_author_the_mission_that_is_followed_is_held_and_few_beside_it() {
