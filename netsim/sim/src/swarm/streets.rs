@@ -55,11 +55,11 @@ impl Swarm {
         }
     }
 
-    /// What each UAV counted itself.
+    /// What each UAV that speaks counted itself.
     fn ask_of_streets(&mut self) {
         for p in &self.peers {
             let minds = p.peer.as_ref().filter(|_| p.process == Process::Running);
-            let life = minds.and_then(|mind| Some((mind, mind.lives_in()?)));
+            let life = minds.and_then(|mind| Some((mind, mind.speaks_in()?)));
             if let Some((mind, life)) = life
                 && let Some(own) = mind.own_usages()
             {
