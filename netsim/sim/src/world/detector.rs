@@ -20,16 +20,13 @@ pub struct Sight {
 impl Sight {
     /// That of a UAV as it is now.
     pub fn of(body: &Kinematic) -> Self {
-        let from = Place {
-            at: body.position(),
-            height_m: body.height_m(),
-        };
-        Self::new(body.picture(), from)
-    }
-
-    /// A picture, taken from there.
-    pub fn new(picture: Picture, from: Place) -> Self {
-        Self { picture, from }
+        Self {
+            picture: body.picture(),
+            from: Place {
+                at: body.position(),
+                height_m: body.height_m(),
+            },
+        }
     }
 
     /// Whether a place is in the picture.

@@ -14,13 +14,13 @@
 //! Laying samples asks once per sample whether there is a roof above it. A look goes through the
 //! samples within reach of a camera, some hundreds, and asks only for those that nobody has seen.
 
-use super::camera::Eye;
 use super::detector::Sight;
 use super::flat::{Bounds, in_ring};
+use super::motion::Kinematic;
 use super::obstacles::{Obstacles, Place};
 use super::survey::Survey;
 use serde::{Deserialize, Serialize};
-use skein_geometry::frame::{Point, Pose};
+use skein_geometry::frame::Point;
 use skein_peer::Mission;
 
 /// Samples are so far apart, east and north, metres: of a square kilometre ten thousand, which
@@ -112,16 +112,12 @@ impl Ground {
         }
     }
 
-    /// A camera is looked through.
-    pub fn look(&mut self, eye: &Eye<'_>, pose: Pose, obstacles: &Obstacles) {
-        let from = Place {
-            at: pose.position(),
-            height_m: eye.height_m,
-        };
-        let sight = Sight::new(eye.picture_now(pose), from);
-        let reach_m = eye.reach_m();
-        let columns = number(from.at.x - reach_m)..=number(from.at.x + reach_m);
-        for row in number(from.at.y - reach_m)..=number(from.at.y + reach_m) {
+    /// The camera of a UAV is looked through.
+    pub fn look(&mut self, body: &Kinematic, obstacles: &Obstacles) {
+        let (sight, from) = (Sight::of(body), body.position());
+        let reach_m = body.eye().reach_m();
+        let columns = number(from.x - reach_m)..=number(from.x + reach_m);
+        for row in number(from.y - reach_m)..=number(from.y + reach_m) {
             for column in columns.clone() {
                 if let Some(i) = self.at((column, row))
                     && self.samples[i] == Sample::Hidden
@@ -182,6 +178,7 @@ mod tests {
     use crate::spec::{Building, Spec};
     use crate::world::World;
     use crate::world::fixture::{airframe, polygon, square, straight};
+    use skein_geometry::frame::Pose;
     use skein_geometry::math::FRAC_PI_2;
     use std::sync::Arc;
 
@@ -212,14 +209,13 @@ mod tests {
 
     /// A flight northwards, 45 m high, east of the origin by so much.
     fn look(ground: &mut Ground, spec: &Spec, east_m: f64) {
-        let mut eye = Eye::from(&airframe());
-        eye.height_m = 45.0;
         let pose = Pose {
             east_m,
             north_m: 200.0,
             heading_rad: FRAC_PI_2,
         };
-        ground.look(&eye, pose, &Obstacles::new(&spec.buildings));
+        let body = Kinematic::new(airframe(), pose, 45.0, 0);
+        ground.look(&body, &Obstacles::new(&spec.buildings));
     }
 
     fn sample(ground: &Ground, east_m: f64, north_m: f64) -> Sample {

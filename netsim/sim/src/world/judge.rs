@@ -8,7 +8,7 @@ use super::camera::Eye;
 use super::fact::{Approach, Fact};
 use super::ground::{Ground, GroundSeen};
 use super::layers::LayerSeen;
-use super::motion::Piece;
+use super::motion::{Kinematic, Piece};
 use super::no_fly::{TurnAway, Zones};
 use super::obstacles::{Obstacles, Place};
 use super::pieces::Pieces;
@@ -16,7 +16,7 @@ use super::separation::Separation;
 use super::survey::Survey;
 use super::task_board::TaskBoard;
 use skein_flight::coverage::ring::CellId;
-use skein_geometry::frame::{Point, Pose};
+use skein_geometry::frame::Point;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -78,9 +78,9 @@ impl Judge {
     }
 
     /// What is on the ground is looked at from a UAV.
-    pub fn look_at_ground(&mut self, eye: &Eye<'_>, pose: Pose, obstacles: &Obstacles) {
+    pub fn look_at_ground(&mut self, body: &Kinematic, obstacles: &Obstacles) {
         if let Some(ground) = &mut self.ground {
-            ground.look(eye, pose, obstacles);
+            ground.look(body, obstacles);
         }
     }
 

@@ -677,8 +677,7 @@ impl World {
             } else if u.body.takes_off_in_ms(to_ms) == 0 {
                 self.airborne.push((u.id, place_of(&u.body)));
                 if to_ms.is_multiple_of(ground::LOOK_MS) {
-                    let (eye, pose) = (u.body.eye(), u.body.pose());
-                    self.judge.look_at_ground(&eye, pose, &self.site.obstacles);
+                    self.judge.look_at_ground(&u.body, &self.site.obstacles);
                 }
             }
         }

@@ -227,10 +227,10 @@ type Turn = (bool, bool, Reverse<usize>, bool, Time, u16);
 
 impl Held {
     /// Among pieces: first what is new in this revision, until it was said a few times or passed on:
-    /// with it who holds the revision before has all. Then what nobody can have, then what most lack, of those what nobody was
-    /// heard passing on, and what was on the air longest ago. Pieces that waited in vain till their
-    /// lifetime was over would else wait behind the same ones again, for ever. Then the ends of a
-    /// mission, where most of what is new is.
+    /// with it who holds the revision before has all. Then what nobody can have, then what most
+    /// lack, of those what nobody was heard passing on, and what was on the air longest ago. Pieces
+    /// that waited in vain till their lifetime was over would else wait behind the same ones again,
+    /// for ever. Then the ends of a mission, where most of what is new is.
     fn turn(&self, key: &RecordKey) -> Turn {
         let lack = Reverse(self.lack);
         let from_end = pieces_from_end(key.2, self.pieces);
@@ -807,19 +807,6 @@ impl Relay {
             self.wait(now, key, kind, delay_ms);
         }
         Some(out)
-    }
-
-    /// Whether a piece is new in its revision: pieces of an earlier one are held, and what it has
-    /// at its place is not this.
-    fn is_changed(&self, key: &RecordKey, piece: Option<&MissionChunk>) -> bool {
-        let Some(piece) = piece else {
-            return false;
-        };
-        let (from, to) = ((key.0, key.1, 0, 0), (key.0, key.1, u16::MAX, 0));
-        let is_revised = self.held.range(from..to).any(|(k, _)| k.3 < key.3);
-        let earlier = self.held.range((key.0, key.1, key.2, 0)..*key);
-        let mut earlier = earlier.filter_map(|(_, h)| piece_of(Kind::Mission, &h.record));
-        is_revised && !earlier.any(|e| e.bytes == piece.bytes)
     }
 
     /// The piece that goes next from what neighbours lent, and its bytes.

@@ -13,10 +13,10 @@
 //! | it is seen again, or seen by another later | the chances are dropped |
 
 use super::{Fused, INNER, Sought, Targets, standing};
-use crate::mission::{PointMm, point_m};
 use crate::sight::Sight;
 use crate::task::CoverageTask;
 use skein_behaviors::Percept;
+use skein_flight::coverage::stations::targets::Targets as Asked;
 use skein_flight::tracking::chance::ChanceMap;
 use skein_flight::tracking::follower::TargetMotion;
 use skein_flight::tracking::lookout::{Looker, fly_to};
@@ -231,12 +231,11 @@ impl Targets {
 
 /// The lines of a mission as streets; none where it asks for none.
 fn streets_of(asks_for: &CoverageTask) -> Option<Streets> {
-    let CoverageTask::Lines(lines) = asks_for else {
+    let Some(Asked::Lines(lines)) = asks_for.targets() else {
         return None;
     };
-    let line = |way: &[PointMm]| way.iter().copied().map(point_m).collect();
-    let lines: Vec<Vec<Point>> = lines.iter().map(|l| line(&l.way)).collect();
-    Streets::of(&lines)
+    let ways: Vec<Vec<Point>> = lines.into_iter().map(|line| line.way).collect();
+    Streets::of(&ways)
 }
 
 /// The square of a way at a place.

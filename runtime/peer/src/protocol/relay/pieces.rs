@@ -10,10 +10,11 @@
 //! The former mission stays until the newer one is whole: its author may be gone after the first
 //! piece, and who begins anew then gets what all others follow.
 
-use super::{Mission, PIECE_INTERVALS, RecordKey, Relay, is_piece};
+use super::{Mission, PIECE_INTERVALS, RecordKey, Relay, is_piece, piece_of};
 use crate::input::Time;
 use crate::mission::MAX_PARTIAL;
 use crate::wire::kinds::Kind;
+use crate::wire::message::MissionChunk;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A newer mission comes no more once so many of its pieces would have been due.
@@ -68,6 +69,19 @@ impl Relay {
         }
         let whole = held.iter().filter(|(_, (n, of))| *n == usize::from(*of));
         whole.map(|(mission, _)| mission.0).max()
+    }
+
+    /// Whether a piece is new in its revision: pieces of an earlier one are held, and what it has
+    /// at its place is not this.
+    pub(super) fn is_changed(&self, key: &RecordKey, piece: Option<&MissionChunk>) -> bool {
+        let Some(piece) = piece else {
+            return false;
+        };
+        let mut held = self.held.range(pieces_of(key.0));
+        let is_revised = held.any(|(k, _)| k.3 < key.3);
+        let earlier = self.held.range((key.0, key.1, key.2, 0)..*key);
+        let mut earlier = earlier.filter_map(|(_, h)| piece_of(Kind::Mission, &h.record));
+        is_revised && !earlier.any(|e| e.bytes == piece.bytes)
     }
 
     /// The newest mission of an author of which a piece came lately; 0 where none did.
