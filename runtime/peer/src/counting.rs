@@ -5,6 +5,7 @@
 //! |---|---|
 //! | a look, all of a site is in the inner part of the picture, no building that the mission tells before a corner of it, and nobody of a lower number has it in its own | the site is watched |
 //! | a vehicle that was outside of a site is inside, while that is watched | it passes, once it is known to drive |
+//! | a vehicle is seen that was not for a second | on which side of an outline it is is known anew: whatever is taken for one that was lost, a false alarm too, drove in nowhere |
 //! | a vehicle is inside of a watched site | the time that it takes and the way that it drives are counted |
 //! | a site is watched for three seconds, from not too high up, and no more than one is seen in it besides who stands | who stands in it is counted anew |
 //! | a site is watched no more, or was for ten intervals since it was told | what was counted there is told |
@@ -402,6 +403,9 @@ impl Counting {
     fn step(&mut self, along: &mut Along, t: &Track, now_ms: u64, watched: u16) {
         let at = t.estimate.position();
         let since_ms = now_ms.saturating_sub(along.last_ms());
+        if since_ms > GAP_MS {
+            *along = Along::begun(t);
+        }
         along.seen(now_ms, at);
         let is_sure = t.confirmed && along.hits >= HITS;
         let drives = along.drives() == Some(true);

@@ -198,6 +198,28 @@ fn who_stands_is_counted_at_the_last_look_and_who_drives_by_is_not() {
 }
 
 /// In a dense lot those who stand are taken for each other, and then for ones that drive.
+/// Eight seconds after a vehicle was lost some forty metres away it may be anywhere in the picture,
+/// and whatever is seen there is taken for it.
+#[test]
+fn who_was_lost_outside_and_is_taken_to_be_inside_did_not_drive_in() {
+    let mut scene = Scene::new(Counted::Passing);
+    let parked = Point::new(38.0, 0.0);
+    scene.look(3.0, &|_| vec![parked]);
+    scene.at = Point::new(-6.0, 0.0);
+    scene.look(8.0, &|_| vec![parked]);
+    let name = scene.tracks.confirmed().next().unwrap().name;
+    let false_alarm = Point::new(12.0, 0.0);
+    scene.look(0.2, &|_| vec![false_alarm]);
+    let taken = scene.tracks.confirmed().next().unwrap();
+    assert_eq!((taken.name, taken.seen_ms), (name, scene.now_ms));
+    assert_eq!(scene.own().passed, 0);
+    // Neither did one that stands there, however long it is looked at.
+    scene.look(3.0, &|_| vec![false_alarm]);
+    let own = scene.own();
+    assert_eq!(own.passed, 0);
+    assert!(own.watched_ms >= 11_000 && own.spent_ms > 0, "{own:?}");
+}
+
 #[test]
 fn where_more_are_seen_than_stand_and_one_that_drives_by_nothing_is_counted() {
     let mut scene = Scene::new(Counted::Standing);
