@@ -391,6 +391,7 @@ impl Cooperation {
         effects.extend(state.notice_end(s, timers));
         state.astray = s.membership.hears_nobody(s.now) && are_many(s.membership.uavs());
         state.silent = s.is_silent;
+        state.listen(s, order);
         state.steer_by_state(s.now, order);
         state.keep_even(s);
         effects.extend(self.trails.tick(s, state));

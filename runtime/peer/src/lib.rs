@@ -16,7 +16,7 @@
 //! | [`input`], [`output`] | what can happen to a peer, and what it wants done |
 //! | [`peer`] | routes events to the parts and carries out their effects |
 //! | [`transmission`], `inbound`, `outbound` | bytes as they are read, and what they are to a peer; what is spoken, and when |
-//! | `cooperation`, `mission_state` | mission, goal, the peer's part in negotiations |
+//! | `cooperation`, `mission_state`, `listening` | mission, goal, the peer's part in negotiations; where it waits |
 //! | `targets` | vehicles on the ground: tracks, what all tell of them, whom a task is bound to |
 //! | `tasking`, `task_desk`, [`errand`], [`relay_circle`] | tasks other than coverage: the peer's part in their auction, its operator's, the flight that does one, the circle that is held |
 //! | [`protocol`] | the machines and rules by which peers agree |
@@ -115,6 +115,7 @@ mod inbound;
 pub mod input;
 pub mod journal;
 pub mod layers;
+mod listening;
 pub mod mission;
 mod mission_change;
 pub mod mission_edit;

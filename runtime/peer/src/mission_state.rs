@@ -18,10 +18,12 @@ use crate::cells::CellSet;
 use crate::company::Company;
 use crate::config::{PeerConfig, Role};
 use crate::cooperation::Situation;
+use crate::diagram::StateGoal;
 use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::fuel::Fuel;
 use crate::input::Time;
 use crate::journal::{Durable, Entry};
+use crate::listening::Listening;
 use crate::mission::Mission;
 use crate::mission_change::{SeenBefore, executive_for, negotiation_begun, separation_for};
 use crate::offload::{Job, MissionGeometry};
@@ -134,6 +136,8 @@ pub(crate) struct MissionState {
     pub finished: bool,
     /// Whether it heard of many and hears nobody now.
     pub astray: bool,
+    /// Where it waits with nothing to do.
+    listening: Listening,
     /// Whether another process under its id has silenced this peer.
     pub silent: bool,
     /// How many peers of its fleet it believes to be down.
@@ -620,7 +624,31 @@ impl MissionState {
     /// Looks at the events that hold, and gives the executive the goal of the state.
     pub fn steer_by_state(&mut self, now: Time, order: Order) {
         self.look(now, order);
-        self.steer(self.goal_of_state());
+        let goal = self.goal_of_state();
+        let goal = match self.listening.circle() {
+            Some(circle) if self.waits_at_base(order) => Goal::Circle(circle),
+            _ => goal,
+        };
+        self.steer(goal);
+    }
+
+    /// Whether it has nothing to do, and nobody told it to be at its base. Where circles are
+    /// settled with others it stays on that which it has.
+    fn waits_at_base(&self, order: Order) -> bool {
+        let is_free = order == Order::Resume && !self.fuel.is_due() && !self.silent;
+        is_free && self.separation.is_none() && self.stage.state().goal == StateGoal::Home
+    }
+
+    /// Looks where to wait for what the operator wants next.
+    pub fn listen(&mut self, s: &Situation<'_>, order: Order) {
+        if !self.waits_at_base(order) {
+            self.listening = Listening::default();
+            return;
+        }
+        let base = self.geometry.mission.base_m();
+        let hears = !s.membership.lacks_stations();
+        let place = (base, &*self.geometry.router);
+        self.listening.look(s.now, hears, s.period_ms, place);
     }
 
     /// Tells the executive who else flies round, as far as their beacons said so: who is able has
@@ -709,6 +737,7 @@ impl MissionState {
             alone: false,
             finished: false,
             astray: false,
+            listening: Listening::default(),
             silent: false,
             lost: 0,
             wind_mps: 0.0,

@@ -44,7 +44,8 @@ const DISTANCES: u32 = 16;
 /// And in so many directions.
 const DIRECTIONS: u32 = 24;
 
-fn circle_round(centre: Point, radius_m: f64) -> Segment {
+/// A circle, counter-clockwise from its easternmost place.
+pub(crate) fn circle_round(centre: Point, radius_m: f64) -> Segment {
     Segment {
         start: Pose::new(centre + Vector::new(radius_m, 0.0), FRAC_PI_2),
         curvature_per_m: 1.0 / radius_m,

@@ -924,6 +924,14 @@ impl Membership {
         self.last_heard.is_some_and(silent)
     }
 
+    /// Whether it knows of ground stations, and believes all of them down.
+    #[must_use]
+    pub fn lacks_stations(&self) -> bool {
+        let mut stations = self.known.values().filter(|k| k.info.ground_station);
+        let all_down = stations.clone().all(|k| k.status == Status::Down);
+        all_down && stations.next().is_some()
+    }
+
     /// How many UAVs are known, the dead and this one included; of whom only others told
     /// counts as one.
     #[must_use]

@@ -4,7 +4,10 @@ use super::{covered, with_operator};
 use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
+use crate::{Command, Input};
 use skein_behaviors::Order;
+use skein_geometry::frame::{Point, Vector};
+use std::sync::Arc;
 
 fn at_work() -> Harness {
     let mut h = with_operator(2, mission(1, 6, 4));
@@ -171,6 +174,57 @@ fn finished_uavs_fly_home() {
     for id in [1, 2] {
         assert!(from_base_m(&mut h, id) < 100.0);
         assert_eq!(h.count_said(id, Kind::Finished), 1);
+    }
+}
+
+/// The only UAV has finished, and where it circles at its base something hides the ground station.
+fn out_of_earshot() -> (Harness, impl Fn(&Harness) -> bool) {
+    let mut h = with_operator(1, mission(1, 4, 3));
+    assert!(h.run_until(250, |h| h.beliefs(1).finished));
+    h.run_s(60);
+    h.isolate(GROUND_STATION, true);
+    let base = Point::new(-60.0, -60.0);
+    let mut middle = Vector::zeros();
+    for _ in 0..30 {
+        h.run_s(1);
+        middle += (h.pose(1).position() - base) / 30.0;
+    }
+    let behind = middle.normalize();
+    let in_earshot = move |h: &Harness| (h.pose(1).position() - base).dot(&behind) < -12.0;
+    (h, in_earshot)
+}
+
+/// Lets links be as where the UAV is, and says whether it comes to where it hears the station.
+fn comes_to_hear(h: &mut Harness, in_earshot: &impl Fn(&Harness) -> bool, for_s: u64) -> bool {
+    (0..for_s).any(|_| {
+        h.run_s(1);
+        assert!(from_base_m(h, 1) < 120.0);
+        let hears = in_earshot(h);
+        h.isolate(GROUND_STATION, !hears);
+        h.beliefs(1).revision == 2
+    })
+}
+
+#[test]
+fn who_waits_where_it_hears_no_station_tries_other_circles_until_the_next_mission_comes() {
+    let (mut h, in_earshot) = out_of_earshot();
+    let next = Command::Mission(Arc::new(mission(2, 6, 4)));
+    h.feed(GROUND_STATION, Input::Command(next));
+    assert!(comes_to_hear(&mut h, &in_earshot, 500));
+    h.isolate(GROUND_STATION, false);
+    assert!(h.run_until(300, |h| h.beliefs(1).finished));
+}
+
+#[test]
+fn who_was_told_to_return_waits_at_its_base_whoever_is_heard() {
+    let (mut h, in_earshot) = out_of_earshot();
+    h.isolate(GROUND_STATION, false);
+    h.order(GROUND_STATION, Order::ReturnToBase);
+    assert!(h.run_until(10, |h| h.beliefs(1).order == Order::ReturnToBase));
+    h.isolate(GROUND_STATION, true);
+    for _ in 0..300 {
+        h.run_s(1);
+        assert!(!in_earshot(&h));
     }
 }
 
