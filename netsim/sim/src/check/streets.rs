@@ -95,6 +95,8 @@ pub struct StreetLook<'a> {
     pub uav: (u16, u32),
     /// Its picture, as it is.
     pub picture: Picture,
+    /// How far off its place it takes itself to be, and all that it sees, metres.
+    pub displaced_m: f64,
     /// Whether its computer is late: what it says is of where it was.
     pub is_late: bool,
     /// Whether nothing stands between its camera and a place.
@@ -215,11 +217,12 @@ impl StreetCheck {
                 let driven = watcher.truth.stretches.entry(stretch).or_default();
                 driven.add(apart_ms, at.speed_mps);
             }
-            for (stretch, place) in at.may.iter().flatten() {
-                if look.watched.contains(place) {
-                    let driven = watcher.truth.stretches.entry(*stretch).or_default();
+            let is_sure = at.is_sure(look.displaced_m);
+            for (stretch, place) in at.may_be(look.displaced_m) {
+                if look.watched.contains(&place) {
+                    let driven = watcher.truth.stretches.entry(stretch).or_default();
                     driven.may_ms += apart_ms;
-                    driven.sure_ms += if at.is_sure { apart_ms } else { 0 };
+                    driven.sure_ms += if is_sure { apart_ms } else { 0 };
                 }
             }
         }

@@ -15,7 +15,7 @@ use crate::pursuit::vehicle::Vehicle;
 use crate::spec::VehicleSpec;
 use skein_behaviors::sightings::{Sighted, Sightings};
 use skein_flight::tracking::estimate::Detection;
-use skein_geometry::frame::Point;
+use skein_geometry::frame::{Point, Vector};
 use skein_geometry::math::seconds;
 use skein_geometry::random::{SplitMix64, mix};
 use skein_peer::criteria::{COLOURS, colour_of, coloured, kind_of};
@@ -83,6 +83,12 @@ impl Vehicles {
     /// Where they are, metres.
     pub fn places(&self) -> impl Iterator<Item = Point> + '_ {
         self.all.iter().map(|v| v.at)
+    }
+
+    /// How far off its place a UAV takes itself to be, and so all that it sees, metres.
+    #[must_use]
+    pub fn displaced(&self, uav: u16) -> Vector {
+        Look::new(self.seed, uav, 0).displaced()
     }
 
     /// Moves them on; who evades does so from the UAVs in the air.

@@ -46,6 +46,7 @@ struct Scene {
     network: Network,
     middle: u16,
     is_late: bool,
+    displaced_m: f64,
     /// Whether a house hides the eastern half, of which the mission tells.
     hidden: bool,
 }
@@ -65,6 +66,7 @@ impl Scene {
             middle: u16::try_from(middle.unwrap()).unwrap(),
             network,
             is_late: false,
+            displaced_m: 0.0,
             hidden: false,
         }
     }
@@ -85,6 +87,7 @@ impl Scene {
             let look = StreetLook {
                 uav: (1, 1),
                 picture: Picture::level(Pose::new(Point::new(100.0, 100.0), 0.0), (50.0, 50.0)),
+                displaced_m: self.displaced_m,
                 is_late: self.is_late,
                 sees: &|at: Point| !self.hidden || at.x < 100.0,
                 watched,
@@ -257,4 +260,41 @@ fn a_hint_that_is_no_way_or_a_slow_one_breaks_the_rule() {
             .on_known(91_000, told, &[hint], &mut scene.found);
         assert_eq!(!scene.found.counts.is_empty(), broken, "{case}");
     }
+}
+
+/// Two streets side by side, fourteen metres apart, and a car on one of them.
+#[test]
+fn who_sees_all_far_beside_its_place_may_take_a_vehicle_to_be_on_the_next_street() {
+    let along = |north_mm| Way {
+        street: 0,
+        places: vec![(0, north_mm), (400_000, north_mm)],
+    };
+    let two = Streets {
+        ways: vec![along(0), along(14_000)],
+        ..streets()
+    };
+    let network = two.network();
+    let reaches = Reaches::of(&network);
+    let located = |north_m: f64| {
+        let (before, at) = (Point::new(100.0, north_m), Point::new(102.0, north_m));
+        let mut located = Located::default();
+        let _ = located.step((&network, &reaches), (before, at), (1_000, 200));
+        located
+    };
+    let on = |located: &Located, displaced_m| {
+        let streets = located.may_be(displaced_m).map(|(stretch, _)| stretch);
+        (streets.collect::<Vec<u16>>(), located.is_sure(displaced_m))
+    };
+    let beside = located(0.5);
+    for displaced_m in [0.0, 5.0, 6.0] {
+        assert_eq!(on(&beside, displaced_m), (vec![0], true));
+    }
+    for displaced_m in [7.0, 30.0] {
+        assert_eq!(on(&beside, displaced_m), (vec![0, 1], false));
+    }
+    // Six metres from the middle of the only street: a UAV that sees it nine metres off may take
+    // it to be on none.
+    let aside = located(-6.0);
+    assert_eq!(on(&aside, 5.0), (vec![0], true));
+    assert_eq!(on(&aside, 6.5), (vec![0], false));
 }

@@ -8,12 +8,17 @@ use std::collections::BTreeMap;
 /// Farther from a middle line nobody is on its street, metres.
 const ASIDE_M: f64 = 12.0;
 
-/// Who is seen five metres beside its place, as one in twenty UAVs sees all, may be taken to be on
-/// another stretch that is no farther than this beyond the nearest one, metres.
+/// So far beside its place all is taken to be by one UAV in twenty, for a whole flight, metres.
+const DISPLACED_M: f64 = 5.0;
+
+/// Who is seen so far beside its place may be taken to be on another stretch that is no farther than
+/// this beyond the nearest one, metres; by a UAV that takes itself to be farther off by twice as
+/// much more, up to the second.
 const MAY_M: f64 = 10.0;
+const MOST_MAY_M: f64 = 20.0;
 
 /// Who is within a crossing, farther from all stretches than this, may as well be taken to be on
-/// none, metres.
+/// none, metres; less by what a UAV is farther off.
 const SURE_M: f64 = 7.0;
 
 /// Of stretches that are about as near that counts along which a vehicle drives, metres.
@@ -70,7 +75,7 @@ pub struct Reaches(Vec<(Point, Point)>);
 
 impl Reaches {
     pub fn of(network: &Network) -> Self {
-        let reach = Vector::new(ASIDE_M + MAY_M, ASIDE_M + MAY_M);
+        let reach = Vector::new(1.0, 1.0) * (ASIDE_M + MOST_MAY_M);
         let around = |way: &Vec<Point>| {
             let far = Point::new(f64::INFINITY, f64::INFINITY);
             let low = way.iter().fold(far, |low, p| low.inf(p));
@@ -88,15 +93,22 @@ impl Reaches {
     }
 }
 
+/// A stretch near a vehicle, the place of it, and how much farther that is than the nearest.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    stretch: u16,
+    place: usize,
+    beyond_m: f64,
+}
+
 /// Where one vehicle is.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Located {
     /// On which stretch, at which of its places.
     pub on: Option<(u16, usize)>,
-    /// Where it may be taken to be.
-    pub may: [Option<(u16, usize)>; MAY],
-    /// Whether it can be taken to be nowhere else.
-    pub is_sure: bool,
+    /// Where it may be taken to be, the nearest first.
+    near: [Option<Near>; MAY],
+    least_m: f64,
     /// How fast, m/s.
     pub speed_mps: f64,
     well: Option<u16>,
@@ -112,13 +124,21 @@ impl Located {
     ) -> Option<Turn> {
         let moved = at - before;
         self.speed_mps = moved.norm() / secs(apart_ms.max(1));
-        let (found, may, least_m) = locate((network, reaches), at, moved);
+        let (found, near, least_m) = locate((network, reaches), at, moved);
         let place = |(stretch, along_m): (u16, f64)| {
             Some((stretch, network.place_along(stretch, along_m)?))
         };
         self.on = found.and_then(place);
-        self.may = may.map(|m| m.and_then(place));
-        self.is_sure = least_m <= SURE_M && self.may.iter().flatten().count() == 1;
+        self.near = near.map(|n| {
+            let (stretch, along_m, beyond_m) = n?;
+            let (stretch, place) = place((stretch, along_m))?;
+            Some(Near {
+                stretch,
+                place,
+                beyond_m,
+            })
+        });
+        self.least_m = least_m;
         let (stretch, along_m) = found?;
         let length_m = network.edges().get(usize::from(stretch))?.length_m;
         if along_m.min(length_m - along_m) < WELL_ON_M.min(length_m / 4.0) {
@@ -133,18 +153,36 @@ impl Located {
         };
         network.turn(turn).map(|_| turn)
     }
+
+    /// On which stretches, at which of their places, a UAV may take it to be that takes itself to
+    /// be so far beside its place, metres.
+    pub fn may_be(&self, displaced_m: f64) -> impl Iterator<Item = (u16, usize)> {
+        let reach_m = MAY_M + 2.0 * (displaced_m - DISPLACED_M).max(0.0);
+        let near = self.near.iter().flatten();
+        let near = near.filter(move |n| n.beyond_m <= reach_m);
+        near.map(|n| (n.stretch, n.place))
+    }
+
+    /// Whether such a UAV can take it to be nowhere else.
+    pub fn is_sure(&self, displaced_m: f64) -> bool {
+        let most_m = SURE_M - (displaced_m - DISPLACED_M).max(0.0);
+        self.least_m <= most_m && self.may_be(displaced_m).count() == 1
+    }
 }
 
 /// A stretch, and how far along it, metres.
 type On = Option<(u16, f64)>;
 
-/// On which stretch a vehicle is that moved so, on which ones it may be taken to be, and how far
-/// the nearest is, metres.
+/// A stretch that is near, how far along it, and how much farther that is than the nearest, metres.
+type Beside = Option<(u16, f64, f64)>;
+
+/// On which stretch a vehicle is that moved so, which ones are near, and how far the nearest is,
+/// metres.
 fn locate(
     (network, reaches): (&Network, &Reaches),
     at: Point,
     moved: Vector,
-) -> (On, [On; MAY], f64) {
+) -> (On, [Beside; MAY], f64) {
     // The nearest place of each stretch that is near enough.
     let mut near: Vec<(f64, f64, u16, f64)> = Vec::new();
     let edges = (0_u16..).zip(network.edges());
@@ -156,7 +194,7 @@ fn locate(
             let length_m = line.norm();
             let along_m = (line.dot(&to) / length_m).clamp(0.0, length_m);
             let aside_m = (to - line * (along_m / length_m)).norm();
-            if aside_m <= ASIDE_M + MAY_M && best.is_none_or(|b| aside_m < b.0) {
+            if aside_m <= ASIDE_M + MOST_MAY_M && best.is_none_or(|b| aside_m < b.0) {
                 let speed = moved.norm();
                 let across = if speed > 0.0 {
                     (line.perp(&moved) / (length_m * speed)).abs()
@@ -172,9 +210,9 @@ fn locate(
     let least_m = near.iter().map(|n| n.0).fold(f64::INFINITY, f64::min);
     near.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut may = [None; MAY];
-    let all = near.iter().filter(|n| n.0 <= least_m + MAY_M);
-    for (slot, (_, _, stretch, along_m)) in may.iter_mut().zip(all) {
-        *slot = Some((*stretch, *along_m));
+    let all = near.iter().filter(|n| n.0 <= least_m + MOST_MAY_M);
+    for (slot, (aside_m, _, stretch, along_m)) in may.iter_mut().zip(all) {
+        *slot = Some((*stretch, *along_m, aside_m - least_m));
     }
     near.retain(|n| n.0 <= ASIDE_M && n.0 <= least_m + ALIKE_M);
     let of = near
