@@ -185,12 +185,17 @@ fn checks(r: &RunReport) -> Vec<Vec<String>> {
             format!("{} do, {} do not", r.finished.len(), r.unfinished.len()),
         ),
         row(
-            c.coverable_share >= c.needed_share,
+            c.is_enough(),
             "enough of the area can be covered",
             format!(
-                "{:.1} % of {:.1} % asked for",
+                "{:.1} % of {:.1} % asked for{}",
                 c.coverable_share * 100.0,
-                c.needed_share * 100.0
+                c.needed_share * 100.0,
+                if c.revised {
+                    "; the mission was changed in flight"
+                } else {
+                    ""
+                }
             ),
         ),
     ];

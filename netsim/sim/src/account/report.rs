@@ -286,6 +286,10 @@ pub struct Coverage {
     pub coverable_share: f64,
     /// The share of the area that the scenario asks for, 0 to 1.
     pub needed_share: f64,
+    /// Whether the mission was changed in flight: the share that is asked for is that of the one
+    /// that the scenario began with.
+    #[serde(default)]
+    pub revised: bool,
     /// How many cells cannot be seen, by reason.
     pub uncoverable: BTreeMap<String, usize>,
     /// Which cells those are, by column and row of the lane grid.
@@ -499,11 +503,21 @@ impl Coverage {
             covered_share: judge.covered_share(),
             coverable_share: survey.coverable_share(),
             needed_share,
+            revised: judge.is_revised(),
             uncoverable,
             uncoverable_cells,
             missed,
             ground: judge.ground_seen(),
         }
+    }
+}
+
+impl Coverage {
+    /// Whether as much of the area can be covered as the scenario asks for. What its operator
+    /// takes away in flight is no failure of those who fly.
+    #[must_use]
+    pub fn is_enough(&self) -> bool {
+        self.revised || self.coverable_share >= self.needed_share
     }
 }
 
@@ -561,7 +575,7 @@ impl RunReport {
         } else if self.makespan_ms.is_none() {
             reasons.push("not everything was seen as often as it is to be".to_owned());
         }
-        if c.coverable_share < c.needed_share {
+        if !c.is_enough() {
             reasons.push(format!(
                 "only {:.1} % of the area is coverable, {:.1} % are asked for",
                 c.coverable_share * 100.0,

@@ -456,3 +456,26 @@ fn what_nobody_ever_followed_fails_a_run_unless_one_uav_is_left_of_several() {
         assert_eq!(told, fails, "{uavs} {lost:?} {:?}", report.reasons);
     }
 }
+
+#[test]
+fn less_to_cover_than_asked_for_fails_a_run_unless_the_mission_was_changed_in_flight() {
+    let mut report = RunReport {
+        makespan_ms: Some(1),
+        finished: vec![1],
+        ..RunReport::default()
+    };
+    for (coverable_share, revised, passes) in [
+        (0.97, false, true),
+        (0.969, false, false),
+        (0.969, true, true),
+    ] {
+        let coverage = &mut report.coverage;
+        (coverage.coverable_share, coverage.needed_share) = (coverable_share, 0.97);
+        coverage.revised = revised;
+        report.judge(&[]);
+        assert_eq!(report.passed, passes, "{coverable_share} {revised}");
+    }
+    let told = report.to_string();
+    let line = "96.9 % of the area (97.0 % asked for; changed in flight)";
+    assert!(told.contains(line), "{told}");
+}

@@ -111,6 +111,10 @@ impl RunReport {
             "  coverable  {:.1} % of the area",
             c.coverable_share * 100.0
         )?;
+        if c.revised && c.coverable_share < c.needed_share {
+            let needed = c.needed_share * 100.0;
+            write!(f, " ({needed:.1} % asked for; changed in flight)")?;
+        }
         for (reason, n) in &c.uncoverable {
             write!(f, "; {n} cells not: {reason}")?;
         }

@@ -172,6 +172,12 @@ impl Judge {
         self.boards.iter().map(|b| b.marks() + 1).sum()
     }
 
+    /// Whether another revision than the first is followed.
+    #[must_use]
+    pub fn is_revised(&self) -> bool {
+        self.boards.len() > 1
+    }
+
     /// The cells and which of them can be seen.
     #[must_use]
     pub fn survey(&self) -> &Survey {
@@ -352,7 +358,9 @@ mod tests {
         let before = judge.n_covered();
         let far = (5_000_000, 5_000_000);
         let zone = [far, (far.0 + 9_000, far.1), (far.0, far.1 + 9_000)];
+        assert!(!judge.is_revised());
         judge.revise(revised(240_000, &zone), (None, 0, 0, false), 2, turn());
+        assert!(judge.is_revised());
         assert_eq!(judge.survey().cells().len(), 40);
         assert!(judge.n_covered() >= 4 && judge.n_covered() < before);
         assert!(judge.saw(1, CellId { col: 7, row: 0 }, 1), "seen before");
