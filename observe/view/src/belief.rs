@@ -11,7 +11,7 @@ use crate::believed_tasks::Tasks;
 use skein_geometry::frame::Origin as Plane;
 use skein_peer::Mission;
 use skein_peer::cells::CellSet;
-use skein_peer::mission::Library;
+use skein_peer::library::Library;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::wire::codec::{Body, open};
 use skein_peer::wire::key;

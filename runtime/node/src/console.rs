@@ -16,7 +16,7 @@
 
 use skein_console::{Asked, Command, Port, Token, TokenError};
 use skein_peer::Mission;
-use skein_peer::mission::chunks;
+use skein_peer::library::chunks;
 use std::future::Future;
 use std::net::SocketAddr;
 use std::path::PathBuf;

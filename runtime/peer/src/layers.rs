@@ -334,7 +334,7 @@ pub(crate) mod tests {
     #[test]
     fn what_has_no_layers_says_nothing_of_them_and_what_has_is_heard_as_it_was_said() {
         let bytes = |m: &Mission| -> Vec<u8> {
-            let pieces = crate::mission::chunks(m).unwrap();
+            let pieces = crate::library::chunks(m).unwrap();
             pieces.into_iter().flat_map(|p| p.bytes).collect()
         };
         let tells = |m: &Mission| bytes(m).windows(6).any(|w| w == b"layers");

@@ -25,6 +25,7 @@
 //! | [`offload`] | work that takes too long for a percept to wait |
 //! | [`wire`] | keys, kinds, messages, their bytes and limits |
 //! | [`mission`], `task`, [`cells`] | what is to be seen, and what was |
+//! | [`library`] | how a mission comes in pieces |
 //!
 //! Each part takes events and returns effects; none touches another.
 //!
@@ -115,6 +116,7 @@ mod inbound;
 pub mod input;
 pub mod journal;
 pub mod layers;
+pub mod library;
 mod listening;
 pub mod mission;
 mod mission_change;

@@ -120,7 +120,7 @@ fn dm_up(m: f64) -> u16 {
 mod tests {
     use super::*;
     use crate::read::testing::mission_of;
-    use skein_peer::mission::{Library, chunks};
+    use skein_peer::library::{Library, chunks};
 
     const TOWN: &str = "{ file: '../data/helsinki_buildings.geojson', default_storeys: 2 }";
 

@@ -33,7 +33,7 @@
 
 use crate::Incarnation;
 use crate::input::Time;
-use crate::mission::pieces_from_end;
+use crate::library::pieces_from_end;
 use crate::output::Priority;
 use crate::protocol::airtime::{Airtime, LASTING_INTERVALS};
 use crate::wire::codec::{self, Body};

@@ -2,7 +2,8 @@
 
 use super::{covered, record, with_operator};
 use crate::input::Command;
-use crate::mission::{Mission, chunks};
+use crate::library::chunks;
+use crate::mission::Mission;
 use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;

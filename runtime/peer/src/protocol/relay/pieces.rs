@@ -12,7 +12,7 @@
 
 use super::{Mission, PIECE_INTERVALS, RecordKey, Relay, is_piece, piece_of};
 use crate::input::Time;
-use crate::mission::MAX_PARTIAL;
+use crate::library::MAX_PARTIAL;
 use crate::wire::kinds::Kind;
 use crate::wire::message::MissionChunk;
 use std::collections::{BTreeMap, BTreeSet};

@@ -381,7 +381,7 @@ fn of_an_author_the_mission_that_is_followed_is_held_and_few_beside_it() {
     for subject in 0..4 {
         assert_eq!(hear_piece_of(&mut r, 5_000, (9, subject)), Offer::New);
     }
-    let most = 4 + 4 * crate::mission::MAX_PARTIAL;
+    let most = 4 + 4 * crate::library::MAX_PARTIAL;
     for step in 0..2_000_u64 {
         let [revision, subject, ..] = (step * 7919).to_le_bytes();
         hear_piece_of(&mut r, 6_000 + step, (revision.max(1), subject % 4));
