@@ -53,6 +53,8 @@ pub fn chunks(mission: &Mission) -> Result<Vec<MissionChunk>, TooLarge> {
 #[derive(Clone, Debug, Default)]
 pub struct Library {
     whole: Option<Arc<Mission>>,
+    /// The pieces of that one, once they were asked for.
+    held: Option<Vec<MissionChunk>>,
     partial: BTreeMap<(u32, u64), BTreeMap<u16, MissionChunk>>,
     /// Of which mission the last piece was that completed none.
     latest: Option<(u32, u64)>,
@@ -64,8 +66,7 @@ impl Library {
     pub fn new(mission: Option<Arc<Mission>>) -> Self {
         Self {
             whole: mission,
-            partial: BTreeMap::new(),
-            latest: None,
+            ..Self::default()
         }
     }
 
@@ -105,7 +106,7 @@ impl Library {
         {
             self.partial
                 .retain(|(revision, _), _| *revision > mission.revision);
-            self.whole = Some(mission);
+            (self.whole, self.held) = (Some(mission), None);
         }
     }
 
@@ -156,9 +157,12 @@ impl Library {
 
     /// The mission of which a piece came, where those that came and, for the others, the pieces of
     /// the mission that is held give what its hash says: most of a revision is as it was before.
-    fn filled(&self, key: (u32, u64), came: u16) -> Option<Mission> {
+    fn filled(&mut self, key: (u32, u64), came: u16) -> Option<Mission> {
+        let whole = self.whole.as_ref()?;
+        let held = self
+            .held
+            .get_or_insert_with(|| chunks(whole).unwrap_or_default());
         let pieces = self.partial.get(&key)?;
-        let held = chunks(self.whole.as_ref()?).ok()?;
         let is_as_before = |i: u16| {
             let before = held.get(usize::from(i)).map(|piece| &piece.bytes);
             pieces.get(&i).map(|piece| &piece.bytes) == before
@@ -256,6 +260,17 @@ mod tests {
                 assert_eq!(done.filter(|done| *done == Ok(true)).count(), 1);
                 assert_eq!(*library.newest().unwrap(), next);
                 assert_eq!(library.lacking(1).unwrap().2, Vec::<u8>::new());
+                // The one after it is filled with this one.
+                let after = Mission {
+                    revision: 3,
+                    base: (9, 9),
+                    ..next.clone()
+                };
+                let newer = (0u16..).zip(all(&after)).zip(&pieces);
+                let newer = newer.filter(|((_, piece), before)| piece.bytes != before.bytes);
+                let done = newer.map(|((i, piece), _)| library.chunk(i, &piece));
+                assert_eq!(done.filter(|done| *done == Ok(true)).count(), 1);
+                assert_eq!(*library.newest().unwrap(), after);
                 new.reverse();
             }
             // Who holds another one collects them all.
