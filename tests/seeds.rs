@@ -1,6 +1,7 @@
 //! Replays the seeds that once failed (`tests/seeds/*.txt`: scenario, seed, `storm` if its
-//! faults are drawn, where the UAVs begin, `own` for where the scenario says, one a line). Each
-//! must complete and break no rule, and the first must give the same history twice.
+//! faults are drawn, where the UAVs begin, `own` for where the scenario says, and `uavs=2` for
+//! another number of them, one a line). Each must complete and break no rule, and the first must
+//! give the same history twice.
 
 use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
@@ -17,7 +18,7 @@ use std::thread::{available_parallelism, scope};
 /// UAVs of the small scenarios.
 const N_UAVS: u16 = 8;
 
-fn prepared(scenario: &str, launch: Option<Launch>) -> Prepared {
+fn prepared(scenario: &str, launch: Option<Launch>, uavs: Option<u16>) -> Prepared {
     Prepared::new(match scenario {
         "square" => fixture::square(N_UAVS),
         "open" => {
@@ -32,6 +33,7 @@ fn prepared(scenario: &str, launch: Option<Launch>) -> Prepared {
         name => {
             let over = Overrides {
                 launch,
+                peers: uavs,
                 ..Overrides::default()
             };
             open(Some(name), &over).expect("a built-in scenario").spec
@@ -59,18 +61,22 @@ struct Kept {
     seed: u64,
     is_storm: bool,
     launch: Option<Launch>,
+    uavs: Option<u16>,
 }
 
 impl Kept {
     /// # Panics
     /// If a line cannot be read: it names the file.
     fn read(file: &Path, line: &str) -> Self {
-        let words: Vec<&str> = line.split_whitespace().collect();
+        let mut words: Vec<&str> = line.split_whitespace().collect();
+        let uavs = words.last().and_then(|word| word.strip_prefix("uavs="));
+        let uavs: Option<u16> = uavs.map(|n| n.parse().unwrap());
+        words.truncate(words.len() - usize::from(uavs.is_some()));
         let (scenario, seed, is_storm, launch) = match words.as_slice() {
             [scenario, seed, launch] => (scenario, seed, false, launch),
             [scenario, seed, "storm", launch] => (scenario, seed, true, launch),
             _ => panic!(
-                "{}: {line:?} needs a scenario, a seed, perhaps the word storm, and a launch",
+                "{}: {line:?} needs a scenario, a seed, perhaps the word storm, a launch, and perhaps uavs=N",
                 file.display()
             ),
         };
@@ -80,12 +86,13 @@ impl Kept {
             seed: seed.parse().unwrap(),
             is_storm,
             launch: (*launch != "own").then(|| launch.parse().unwrap()),
+            uavs,
         }
     }
 
-    /// Of one scenario and launch all is prepared once.
+    /// Of one scenario, launch and number of UAVs all is prepared once.
     fn place(&self) -> String {
-        format!("{} {:?}", self.scenario, self.launch)
+        format!("{} {:?} {:?}", self.scenario, self.launch, self.uavs)
     }
 
     fn fly(&self, (prepared, free_ms): &(Prepared, u64)) -> Outcome {
@@ -132,7 +139,7 @@ fn seeds_that_once_failed_hold() {
     let work = || {
         while let Some(kept) = kept.get(next.fetch_add(1, Ordering::Relaxed)) {
             let place = places[&kept.place()].get_or_init(|| {
-                let prepared = prepared(&kept.scenario, kept.launch);
+                let prepared = prepared(&kept.scenario, kept.launch, kept.uavs);
                 let free_ms = runs::failure_free_makespan_ms(&prepared);
                 (prepared, free_ms)
             });
