@@ -63,6 +63,11 @@ pub(crate) fn second_kind(phi: f64, m: f64) -> f64 {
     2.0 * halves * within(PI / 2.0, m) + within(phi - halves * PI, m)
 }
 
+/// E(π/2 | m), to the bit as [`second_kind`] tells it, in half of the time.
+pub(crate) fn second_kind_complete(m: f64) -> f64 {
+    within(PI / 2.0, m)
+}
+
 /// For |φ| ≤ π/2.
 fn within(phi: f64, m: f64) -> f64 {
     if m >= ONE {
@@ -133,6 +138,12 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn the_complete_integral_is_the_same_to_the_bit(m in 0.0f64..1.0) {
+            let whole = second_kind(PI / 2.0, m);
+            prop_assert_eq!(second_kind_complete(m).to_bits(), whole.to_bits());
+        }
+
         #[test]
         fn sums_are_the_closed_form(from in -8.0f64..8.0, wide in -5.0f64..5.0, m in 0.0f64..0.7) {
             let closed = second_kind(from + wide, m) - second_kind(from, m);
