@@ -71,7 +71,9 @@ impl Kept {
         let mut words: Vec<&str> = line.split_whitespace().collect();
         let uavs = words.last().and_then(|word| word.strip_prefix("uavs="));
         let uavs: Option<u16> = uavs.map(|n| n.parse().unwrap());
-        words.truncate(words.len() - usize::from(uavs.is_some()));
+        if uavs.is_some() {
+            words.pop();
+        }
         let (scenario, seed, is_storm, launch) = match words.as_slice() {
             [scenario, seed, launch] => (scenario, seed, false, launch),
             [scenario, seed, "storm", launch] => (scenario, seed, true, launch),

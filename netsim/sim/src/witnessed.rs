@@ -216,7 +216,7 @@ impl Witnessed {
             let look = StreetLook {
                 uav: (uav, life),
                 picture: m.picture,
-                displaced_m: world.vehicles().displaced(uav).norm(),
+                displaced_m: world.vehicles().displaced_m(uav),
                 is_late: false,
                 sees: &|at: Point| world.is_open_from(m.eye, at),
                 watched,

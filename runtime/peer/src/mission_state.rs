@@ -137,7 +137,7 @@ pub(crate) struct MissionState {
     /// Whether it heard of many and hears nobody now.
     pub astray: bool,
     /// Where it waits with nothing to do.
-    listening: Listening,
+    pub listening: Listening,
     /// Whether another process under its id has silenced this peer.
     pub silent: bool,
     /// How many peers of its fleet it believes to be down.
@@ -624,12 +624,10 @@ impl MissionState {
     /// Looks at the events that hold, and gives the executive the goal of the state.
     pub fn steer_by_state(&mut self, now: Time, order: Order) {
         self.look(now, order);
-        let goal = self.goal_of_state();
-        let goal = match self.listening.circle() {
-            Some(circle) if self.waits_at_base(order) => Goal::Circle(circle),
-            _ => goal,
-        };
-        self.steer(goal);
+        if !self.waits_at_base(order) {
+            self.listening = Listening::default();
+        }
+        self.steer(self.goal_of_state());
     }
 
     /// Whether it has nothing to do, and nobody told it to be at its base. Where circles are
@@ -642,7 +640,6 @@ impl MissionState {
     /// Looks where to wait for what the operator wants next.
     pub fn listen(&mut self, s: &Situation<'_>, order: Order) {
         if !self.waits_at_base(order) {
-            self.listening = Listening::default();
             return;
         }
         let base = self.geometry.mission.base_m();

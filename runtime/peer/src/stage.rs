@@ -257,7 +257,10 @@ impl MissionState {
                 Some(flight) => Goal::Detour(flight.clone(), legs()),
                 None => Goal::Legs(legs()),
             },
-            StateGoal::Home => Goal::Point(self.geometry.mission.base_m()),
+            StateGoal::Home => match self.listening.circle() {
+                Some(circle) => Goal::Circle(circle),
+                None => Goal::Point(self.geometry.mission.base_m()),
+            },
         }
     }
 }

@@ -510,9 +510,7 @@ impl Coverage {
             ground: judge.ground_seen(),
         }
     }
-}
 
-impl Coverage {
     /// Whether as much of the area can be covered as the scenario asks for. What its operator
     /// takes away in flight is no failure of those who fly.
     #[must_use]

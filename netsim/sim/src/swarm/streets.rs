@@ -28,7 +28,7 @@ impl Swarm {
         let look = StreetLook {
             uav: (id, life),
             picture: body.picture(),
-            displaced_m: self.air.vehicles().displaced(id).norm(),
+            displaced_m: self.air.vehicles().displaced_m(id),
             is_late: peer.slow_ms > 0,
             sees: &|at: Point| world.is_open_to(id, at),
             watched,

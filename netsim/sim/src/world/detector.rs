@@ -53,14 +53,23 @@ pub struct Look {
     displaced: Vector,
 }
 
+/// Tells UAVs apart.
+fn of_uav(seed: u64, uav: u16) -> u64 {
+    mix(seed ^ u64::from(uav) << 48)
+}
+
+/// How far off a UAV takes itself to be for the whole flight, metres.
+pub fn displaced(seed: u64, uav: u16, noise: &Noise) -> Vector {
+    let mut random = SplitMix64::new(of_uav(seed, uav));
+    Vector::new(random.normal(), random.normal()) * noise.place_m
+}
+
 impl Look {
     /// The look of a UAV at a time.
     pub fn new(seed: u64, uav: u16, now_ms: u64) -> Self {
         let noise = Noise::usual();
-        let of_uav = mix(seed ^ u64::from(uav) << 48);
-        let mut random = SplitMix64::new(of_uav);
-        let displaced = Vector::new(random.normal(), random.normal()) * noise.place_m;
-        let seed = of_uav ^ now_ms;
+        let displaced = displaced(seed, uav, &noise);
+        let seed = of_uav(seed, uav) ^ now_ms;
         Self {
             seed,
             noise,

@@ -6,16 +6,17 @@
 //! seed, the UAV and the time alone, so who asks twice at one time is told the same. Without
 //! vehicles there is no detector, and nothing is drawn.
 
-use super::detector::{Look, Sight};
+use super::detector::{Look, Sight, displaced};
 use super::motion::Kinematic;
 use super::obstacles::{Obstacles, Place};
 use crate::check::detections::Truth;
 use crate::pursuit::KINDS;
+use crate::pursuit::sensor::Noise;
 use crate::pursuit::vehicle::Vehicle;
 use crate::spec::VehicleSpec;
 use skein_behaviors::sightings::{Sighted, Sightings};
 use skein_flight::tracking::estimate::Detection;
-use skein_geometry::frame::{Point, Vector};
+use skein_geometry::frame::Point;
 use skein_geometry::math::seconds;
 use skein_geometry::random::{SplitMix64, mix};
 use skein_peer::criteria::{COLOURS, colour_of, coloured, kind_of};
@@ -87,8 +88,8 @@ impl Vehicles {
 
     /// How far off its place a UAV takes itself to be, and so all that it sees, metres.
     #[must_use]
-    pub fn displaced(&self, uav: u16) -> Vector {
-        Look::new(self.seed, uav, 0).displaced()
+    pub fn displaced_m(&self, uav: u16) -> f64 {
+        displaced(self.seed, uav, &Noise::usual()).norm()
     }
 
     /// Moves them on; who evades does so from the UAVs in the air.

@@ -11,7 +11,7 @@
 //! arbitrary; it has this least value. (It prints ẏ = A cos(…) ẋ, where A′ is meant.)
 //! The curve lies in the air: so a wind changes nothing of it but the target's drift.
 
-use crate::trajectory::timed::elliptic::{second_kind, second_kind_complete};
+use crate::trajectory::timed::elliptic::second_kind;
 use skein_geometry::math::{FRAC_PI_2, PI, TAU, asin, atan2, hypot, sin_cos};
 
 /// Crests are a tenth wider than the airframe could turn: what is left steers.
@@ -39,7 +39,7 @@ pub struct Weave {
 #[must_use]
 pub fn ratio_of(slope: f64) -> f64 {
     let square = slope * slope;
-    second_kind_complete(square / (1.0 + square)) * (1.0 + square).sqrt() / FRAC_PI_2
+    second_kind(FRAC_PI_2, square / (1.0 + square)) * (1.0 + square).sqrt() / FRAC_PI_2
 }
 
 impl Weave {
