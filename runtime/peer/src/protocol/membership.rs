@@ -20,6 +20,7 @@
 //! | any | a heartbeat of a later life, younger than the bound | likewise, in that life |
 //! | any | a heartbeat of a later life, older than the bound | down, in that life |
 //! | alive | an old heartbeat of the same life with a higher count | alive; gossip says it, until its author takes a new life |
+//! | any | its author itself says a lower count of this life than one that was sent more than 2 T' before | as before; gossip says the higher one, until its author takes a new life |
 //!
 //! Ages are sums of holding times, never differences of clocks, and they count
 //! wherever a heartbeat is heard: so one that travelled long is known to be old, and
@@ -425,7 +426,21 @@ impl Membership {
         self.noting(now, author, |m| {
             m.merge(now, own, limits, &mut changes);
         });
+        self.meet(now, author, limits.interval_ms);
         changes
+    }
+
+    /// A neighbour is heard itself. If it was away, it heard of nobody meanwhile who was not.
+    fn meet(&mut self, now: Time, neighbour: u16, interval_ms: u64) {
+        let known = self.known.get_mut(&neighbour);
+        let Some(since) = known.and_then(|k| k.meet(now, interval_ms)) else {
+            return;
+        };
+        let others = self.known.iter_mut().filter(|(id, _)| **id != neighbour);
+        let there = others.filter(|(_, k)| k.is_believed() && !k.was_away(now, interval_ms));
+        for (_, other) in there {
+            other.note_unknown_to(now, neighbour, since, interval_ms);
+        }
     }
 
     fn on_gossip(
@@ -634,7 +649,7 @@ impl Membership {
                 && known.freshest.incarnation == heard.incarnation
                 && known.status == Status::Alive
             {
-                known.note_higher_count(heard);
+                known.note_higher_count(now, heard);
             }
             return false;
         }
@@ -657,6 +672,7 @@ impl Membership {
         };
         let version = |h: &HeardHeartbeat| (h.incarnation, h.count);
         if version(&heard) < version(&known.freshest) {
+            known.note_lower_count(now, &heard, interval_ms);
             return false;
         }
         if version(&heard) == version(&known.freshest) {
@@ -681,6 +697,10 @@ impl Membership {
             known.status != Status::Down && urgency(&known.freshest, &limits, verdict_ms, now) > 0;
         let passes_on = is_far && was_asked && heard.suspected.is_none() && !new_life;
         let before = known.freshest;
+        if known.status == Status::Down {
+            known.is_back(now);
+        }
+        known.note_fresh_count(now, &heard);
         if passes_on && heard.hops > 1 {
             // What was asked for comes by whatever way is quick: nobody is farther for it.
             heard.hops = heard.hops.min(before.hops.max(2));
@@ -688,13 +708,6 @@ impl Membership {
         known.freshest = heard;
         known.asked = 0;
         known.is_untold_suspicion = false;
-        if new_life
-            || known
-                .higher_count_heard
-                .is_some_and(|h| h.count <= heard.count)
-        {
-            known.higher_count_heard = None;
-        }
         if !passes_on || heard.hops == 1 {
             known.note_hops(now, heard.hops, interval_ms);
         }

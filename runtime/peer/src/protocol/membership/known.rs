@@ -1,7 +1,7 @@
 //! One peer as another knows it: its freshest heartbeat, how old that is, by how many
 //! hops it came.
 
-use super::extent::Patience;
+use super::extent::{HOP_INTERVALS, Patience};
 use super::questions::urgency;
 use super::{Change, Info};
 use crate::Incarnation;
@@ -71,6 +71,8 @@ pub(super) struct Known {
     pub(super) is_untold_suspicion: bool,
     /// A neighbour that depends on what this peer tells of it.
     lag: Option<Lag>,
+    /// That it was held for down, and is there again.
+    absence: Option<Absence>,
     /// When this peer last told of it.
     told_at: Time,
     /// When the heartbeat was sent that neighbours were last told of.
@@ -79,9 +81,8 @@ pub(super) struct Known {
     pub(super) asked: u8,
     /// When this peer last answered for it at once.
     pub(super) answered_at: Time,
-    /// An old heartbeat of this very life with a higher count than it now sends: it lost
-    /// its disk and uses an incarnation twice. It is told, so that it takes a new one.
-    pub(super) higher_count_heard: Option<HeardHeartbeat>,
+    /// It lost its disk and uses an incarnation twice. It is told, so that it takes a new one.
+    reuse: Option<Reuse>,
 }
 
 /// What the patience of others owes to a peer; nothing of who is down or was not heard.
@@ -150,6 +151,39 @@ struct Lag {
     until: Time,
 }
 
+impl Lag {
+    fn new(now: Time, teller: u16, sent: Time, interval_ms: u64) -> Self {
+        Self {
+            teller,
+            since: Told::of(sent),
+            at: now,
+            until: now.plus_ms(HOP_INTERVALS * interval_ms),
+        }
+    }
+}
+
+/// Somebody was held for down, and is there again.
+#[derive(Clone, Copy, Debug)]
+struct Absence {
+    /// When the heartbeat was sent that was known of it meanwhile.
+    since: Time,
+    /// When it was heard of again.
+    until: Time,
+    /// Whether it was heard itself since.
+    is_met: bool,
+}
+
+/// One life was begun twice.
+#[derive(Clone, Copy, Debug)]
+struct Reuse {
+    /// An old heartbeat of it with a higher count than is sent now.
+    heartbeat: HeardHeartbeat,
+    /// When a lower count was last heard.
+    heard_at: Time,
+    /// When it was last told.
+    told_at: Option<Time>,
+}
+
 /// Of a peer the fewest hops are told by which it was heard of in so many of the longest
 /// intervals: each neighbour has told of it by then, and it has not flown far.
 const NEAR_INTERVALS: u64 = 4;
@@ -163,6 +197,12 @@ const BEHIND: u32 = 4;
 /// What a neighbour told of what it knows is outdated after so many intervals, whoever knew
 /// more meanwhile.
 const LAG_INTERVALS: u64 = 4;
+
+/// Who began a life anew without knowing is told so again after so many intervals.
+const REMINDER_INTERVALS: u64 = 2;
+
+/// What was sent so many intervals later was sent later, whatever delays it.
+const LATER_INTERVALS: u64 = 2;
 
 /// Hops of somebody who was not heard in the last ten intervals.
 const NO_HOPS: [(Time, u8); 10] = [(Time(0), u8::MAX); 10];
@@ -186,11 +226,12 @@ impl Known {
             news_told: 0,
             is_untold_suspicion: false,
             lag: None,
+            absence: None,
             told_at: Time(0),
             told_sent: Told::default(),
             asked: 0,
             answered_at: Time(0),
-            higher_count_heard: None,
+            reuse: None,
         }
     }
 
@@ -303,12 +344,7 @@ impl Known {
         let farther = told.hops > self.distance(now, interval_ms).saturating_add(1);
         let behind = told.count.saturating_add(BEHIND) <= mine.count;
         let sent = told.age.since();
-        let told = Lag {
-            teller,
-            since: Told::of(sent),
-            at: now,
-            until: now.plus_ms(super::extent::HOP_INTERVALS * interval_ms),
-        };
+        let told = Lag::new(now, teller, sent, interval_ms);
         if !farther && !behind {
             self.lag = self.lag.filter(|lag| lag.teller != teller);
             return self.others_told(sent);
@@ -322,6 +358,46 @@ impl Known {
             self.lag = Some(told);
         } else if let Some(lag) = &mut self.lag {
             lag.until = lag.until.max(told.until);
+        }
+    }
+
+    /// It was held for down, and is heard of again.
+    pub(super) fn is_back(&mut self, now: Time) {
+        self.absence = Some(Absence {
+            since: self.freshest.age.since(),
+            until: now,
+            is_met: false,
+        });
+    }
+
+    /// Whether it was held for down, and is there again of late.
+    pub(super) fn was_away(&self, now: Time, interval_ms: u64) -> bool {
+        let lately_ms = HOP_INTERVALS * interval_ms;
+        self.absence
+            .is_some_and(|a| now.since_ms(a.until) <= lately_ms)
+    }
+
+    /// It is heard itself. When its absence began, if it is over of late and this is the first
+    /// time since.
+    pub(super) fn meet(&mut self, now: Time, interval_ms: u64) -> Option<Time> {
+        let is_late = !self.was_away(now, interval_ms);
+        let absence = self.absence.as_mut()?;
+        let is_met = std::mem::replace(&mut absence.is_met, true);
+        (!is_met && !is_late).then_some(absence.since)
+    }
+
+    /// A neighbour was away since then, and this one was not: nobody told that one of it.
+    pub(super) fn note_unknown_to(
+        &mut self,
+        now: Time,
+        neighbour: u16,
+        since: Time,
+        interval_ms: u64,
+    ) {
+        let lag = Lag::new(now, neighbour, since, interval_ms);
+        let knows_more = |l: Lag| l.until <= now || lag.since.by_any < l.since.by_any;
+        if self.lag.is_none_or(knows_more) {
+            self.lag = Some(lag);
         }
     }
 
@@ -495,11 +571,21 @@ impl Known {
         }
     }
 
-    /// What the peer itself has to hear, if it began a life anew without knowing.
-    pub(super) fn reminder(&self, now: Time, interval_ms: u64) -> Option<Gossip> {
-        self.higher_count_heard
-            .as_ref()
-            .map(|h| self.gossip_of(h, now, interval_ms))
+    /// What the peer itself has to hear, if it began a life anew without knowing and may hear it.
+    pub(super) fn reminder(&self, now: Time, moment: (u64, u64)) -> Option<Gossip> {
+        let (interval_ms, own_interval_ms) = moment;
+        let reuse = self.reuse.as_ref()?;
+        let waits_ms = REMINDER_INTERVALS * own_interval_ms;
+        let is_due = reuse.told_at.is_none_or(|t| now.since_ms(t) >= waits_ms);
+        let is_there = now.since_ms(reuse.heard_at) < HOP_INTERVALS * interval_ms;
+        (is_due && is_there).then(|| self.gossip_of(&reuse.heartbeat, now, interval_ms))
+    }
+
+    /// The peer itself was told so.
+    pub(super) fn remind(&mut self, now: Time) {
+        if let Some(reuse) = &mut self.reuse {
+            reuse.told_at = Some(now);
+        }
     }
 
     fn gossip_of(&self, heard: &HeardHeartbeat, now: Time, interval_ms: u64) -> Gossip {
@@ -519,13 +605,41 @@ impl Known {
 
     /// An old heartbeat of this life with a higher count than a fresh one: nobody counts
     /// backwards, so the incarnation is used twice.
-    pub(super) fn note_higher_count(&mut self, heard: HeardHeartbeat) {
+    pub(super) fn note_higher_count(&mut self, now: Time, heard: HeardHeartbeat) {
         // What was noted before goes beyond the fresh one itself.
         let most = self
-            .higher_count_heard
-            .map_or(self.freshest.count, |h| h.count);
+            .reuse
+            .map_or(self.freshest.count, |r| r.heartbeat.count);
         if heard.count > most {
-            self.higher_count_heard = Some(heard);
+            self.reuse = Some(Reuse {
+                heartbeat: heard,
+                heard_at: now,
+                told_at: None,
+            });
+        }
+    }
+
+    /// It says itself a lower count of this life than the one that it was known by for long.
+    pub(super) fn note_lower_count(&mut self, now: Time, heard: &HeardHeartbeat, interval_ms: u64) {
+        let mine = self.freshest;
+        let is_later = mine.age.ms(now) > heard.age.ms(now) + LATER_INTERVALS * interval_ms;
+        if heard.hops == 1 && heard.incarnation == mine.incarnation && is_later {
+            let told_at = self.reuse.and_then(|r| r.told_at);
+            self.reuse = Some(Reuse {
+                heartbeat: mine,
+                heard_at: now,
+                told_at,
+            });
+        }
+    }
+
+    /// It says a count of its life that nobody knew, or it has a life of its own.
+    pub(super) fn note_fresh_count(&mut self, now: Time, heard: &HeardHeartbeat) {
+        let life = self.freshest.incarnation;
+        let is_lower = |r: &Reuse| heard.incarnation == life && heard.count < r.heartbeat.count;
+        self.reuse = self.reuse.filter(is_lower);
+        if let Some(reuse) = &mut self.reuse {
+            reuse.heard_at = now;
         }
     }
 }

@@ -105,8 +105,14 @@ impl Telling {
         behind: &BTreeSet<u16>,
     ) -> Vec<Gossip> {
         let (now, interval_ms) = (moment.now, moment.interval_ms);
-        let reminders = peers.values().filter_map(|k| k.reminder(now, interval_ms));
-        let mut told: Vec<Gossip> = reminders.take(max / 4).collect();
+        let intervals_ms = (interval_ms, moment.own_interval_ms);
+        let reminders = peers.values().filter_map(|k| k.reminder(now, intervals_ms));
+        let mut told: Vec<Gossip> = reminders.take(max.div_ceil(4)).collect();
+        for reminder in &told {
+            if let Some(known) = peers.get_mut(&reminder.id) {
+                known.remind(now);
+            }
+        }
         let max = max - told.len();
         let urgent = peers.iter().filter(|(_, k)| k.is_news(now));
         let mut ids: Vec<u16> = urgent.map(|(id, _)| *id).collect();

@@ -276,6 +276,55 @@ fn who_began_a_life_anew_is_reminded_through_those_who_never_met_the_first() {
     assert_eq!(of_four(&mut m, 20), [1]);
 }
 
+/// Peer 4 lost its disk and begins its life again, which is known with a higher count.
+#[test]
+fn who_says_a_lower_count_itself_is_told_of_the_higher_one_and_not_for_ever() {
+    for is_down in [true, false] {
+        let mut m = Membership::new(6, 1000);
+        m.on_beacon(Time(0), 4, 1, &beacon(51, Vec::new()));
+        for id in 10..=30 {
+            m.on_beacon(Time(100), id, 1, &beacon(9, Vec::new()));
+        }
+        let mut now = Time(2_500);
+        if is_down {
+            now = Time(20_000);
+            m.tick(now);
+            m.tick(now.plus_ms(20_000));
+            now = now.plus_ms(20_000);
+        }
+        let status = m.status(4).map(|(_, s)| s);
+        assert_eq!(status == Some(Status::Down), is_down);
+        no_news(&mut m);
+        let counts = |m: &mut Membership, now: Time| -> Vec<u32> {
+            let told = m.tell(now, 4, &BTreeSet::new()).0;
+            let of_four = told.iter().filter(|g| g.id == 4);
+            of_four.map(|g| g.heartbeat).collect()
+        };
+        // A heartbeat that waited on its way is of before.
+        m.on_heartbeat(Time(1_900), 4, 1, (49, 4));
+        assert!(m.known[&4].reminder(now, (1_000, 1_000)).is_none());
+        m.on_heartbeat(now, 4, 1, (2, 4));
+        // In the smallest room there is one whole entry.
+        assert_eq!(counts(&mut m, now), [51]);
+        // It did not hear that; but others are to hear of others, too.
+        let at = |ms| now.plus_ms(ms);
+        m.on_heartbeat(at(1_000), 4, 1, (4, 4));
+        assert_ne!(counts(&mut m, at(1_000)), [51]);
+        m.on_heartbeat(at(2_000), 4, 1, (6, 4));
+        assert_eq!(counts(&mut m, at(2_000)), [51]);
+        // It is heard no more, or it has taken a life of its own.
+        let mut later = m.clone();
+        later.on_heartbeat(at(3_000), 4, 2, (1, 4));
+        assert!(
+            later.known[&4]
+                .reminder(at(4_000), (1_000, 1_000))
+                .is_none()
+        );
+        assert!(m.known[&4].reminder(at(4_000), (1_000, 1_000)).is_some());
+        assert!(m.known[&4].reminder(at(12_000), (1_000, 1_000)).is_none());
+    }
+}
+
 #[test]
 fn a_suspicion_is_taken_over_and_refuted() {
     let mut m = Membership::new(1, 1000);
@@ -550,6 +599,55 @@ fn who_does_not_hear_a_neighbour_any_more_is_told_of_it_though_it_was_as_near() 
     m.on_beacon(Time(3_000), 3, 1, &stale);
     let ids: Vec<u16> = m.gossip(Time(5_000), 3).iter().map(|g| g.id).collect();
     assert_eq!(ids, [9, 2, 3], "10 is less than two intervals behind");
+}
+
+/// Peers 2 to 13 hear each other. Peer 20 was away for a minute, and knows of the others what it
+/// knew when it went; so do 21 and 22, who come back with it.
+#[test]
+fn who_comes_back_is_told_of_those_who_stayed() {
+    let mut m = Membership::new(1, 1000);
+    for id in (2..=13).chain(20..=22) {
+        m.on_beacon(Time(0), id, 1, &beacon(5, Vec::new()));
+    }
+    let mut now = Time(0);
+    for t in 1..=60 {
+        now = Time(1_000 * t);
+        for id in 2..=13 {
+            let count = 5 + 2 * u32::try_from(t).unwrap();
+            m.on_beacon(now, id, 1, &beacon(count, Vec::new()));
+        }
+        m.tick(now);
+        m.tell(now, 4, &BTreeSet::new());
+    }
+    let down = |m: &Membership| m.all().filter(|(.., s)| *s == Status::Down).count();
+    assert_eq!(down(&m), 3);
+    let wants = |m: &Membership, id: u16| m.known[&id].is_wanted(now);
+    // It is heard of by others first: whoever hears it itself tells it.
+    m.on_beacon(now, 5, 1, &beacon(200, vec![entry(20, 90, 3, None)]));
+    assert!((2..=13).all(|id| !wants(&m, id)));
+    m.on_heartbeat(now, 20, 1, (91, 4));
+    assert!((2..=13).all(|id| wants(&m, id)));
+    assert!((20..=22).all(|id| !wants(&m, id)));
+    // As much is gained as it was away.
+    assert_eq!(m.known[&7].want(now).0, 60_000);
+    // Of whom it tells as if it had heard of them it needs not hear.
+    m.on_beacon(now, 20, 1, &beacon(92, vec![entry(7, 125, 1, None)]));
+    assert!(!wants(&m, 7) && wants(&m, 8));
+    // The others are told of: two heartbeats in a beacon and two half-way are most that fit.
+    let mut told = BTreeSet::new();
+    for t in 1..=4 {
+        let (whole, fresh) = m.tell(now.plus_ms(1_000 * t), 4, &BTreeSet::new());
+        let between = m.tell_between(now.plus_ms(1_000 * t + 500));
+        told.extend(whole.iter().map(|g| g.id));
+        told.extend(fresh.iter().chain(&between).map(|f| f.id));
+    }
+    assert!((8..=13).all(|id| told.contains(&id)), "{told:?}");
+    // Those who come back with it know of each other, and it is met once.
+    m.on_heartbeat(now.plus_ms(5_000), 21, 1, (92, 4));
+    assert!((20..=22).all(|id| !m.known[&id].is_wanted(now.plus_ms(5_000))));
+    let lag = m.known[&8].want(now.plus_ms(5_000));
+    m.on_heartbeat(now.plus_ms(5_000), 20, 1, (95, 4));
+    assert_eq!(m.known[&8].want(now.plus_ms(5_000)), lag);
 }
 
 #[test]
