@@ -174,7 +174,7 @@ fn the_planner_misses_no_cell_that_the_world_calls_coverable() {
             survey.coverable_share()
         );
         // What an operator's next mission asks for is judged by what the planner leaves out.
-        assert_eq!(survey.left_out(&scenario.geometry), 0, "{name}");
+        assert_eq!(survey.left_out(&scenario.geometry), [], "{name}");
         let open = survey.cells().iter().filter(|c| c.uncoverable.is_none());
         let the_loop = &scenario.geometry.coverage_loop;
         // The middles of the judge's own squares lie in the pieces of the passes, and its

@@ -433,7 +433,7 @@ impl<'a> Trial<'a> {
             let geometry = skein_netsim::geometry_of(mission).map_err(|e| e.to_string())?;
             let survey = Survey::of_mission(&self.spec, mission).map_err(|e| e.to_string())?;
             Ok::<_, String>((
-                survey.left_out(&geometry),
+                survey.left_out(&geometry).len(),
                 survey.as_planned(&geometry),
                 geometry,
             ))

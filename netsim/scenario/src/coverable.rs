@@ -3,7 +3,6 @@
 
 use crate::resolve::Scenario;
 use skein_flight::coverage::ring::CellId;
-use skein_peer::CoverageTask;
 
 /// What can be seen of a scenario's area, by the world's own geometry.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +13,7 @@ pub struct Coverable {
     pub n_coverable: usize,
     /// Share of the area that those cover, 0 to 1.
     pub share: f64,
-    /// Cells that could be seen and are not on the planner's loop.
+    /// Cells that could be seen and that the planner leaves out, by the world's names.
     pub missed: Vec<CellId>,
 }
 
@@ -23,20 +22,11 @@ impl Coverable {
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         let survey = &scenario.survey;
-        let the_loop = &scenario.geometry.coverage_loop;
-        let open = survey.cells().iter().filter(|c| c.uncoverable.is_none());
         Self {
             n_cells: survey.cells().len(),
             n_coverable: survey.n_coverable(),
             share: survey.coverable_share(),
-            // Squares and pieces of the world's own have no names on the loop.
-            missed: match scenario.spec.mission.task {
-                CoverageTask::Area | CoverageTask::Points(_) => open
-                    .map(|c| c.id)
-                    .filter(|id| the_loop.index_of(*id).is_none())
-                    .collect(),
-                CoverageTask::Exact | CoverageTask::Lines(_) => Vec::new(),
-            },
+            missed: survey.left_out(&scenario.geometry),
         }
     }
 }

@@ -13,6 +13,7 @@ use skein_netsim::fault::Fault;
 use skein_netsim::fault_generator::kills;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_netsim::world::Survey;
+use skein_peer::CoverageTask;
 use skein_peer::mission::GeometryError;
 use skein_peer::offload::MissionGeometry;
 use skein_peer::wire::limits::PEERS_MAX;
@@ -49,7 +50,9 @@ pub(crate) fn with_geometry(
 ) -> (Vec<Finding>, Summary) {
     let mut out = without_geometry(spec);
     let summary = summary(spec, geometry);
-    enough_is_coverable(spec, &summary, survey, &mut out);
+    let planned = survey.clone().as_planned(geometry);
+    nothing_is_left_out(spec, survey, &planned, &mut out);
+    enough_is_coverable(spec, &summary, &planned, &mut out);
     on_loop(spec, geometry, &summary, &mut out);
     (out, summary)
 }
@@ -199,6 +202,24 @@ fn survivors(spec: &Spec) -> usize {
 }
 
 /// What the loop reaches, and what the judge of a run will count.
+/// Nobody looks for cells that could be seen and that the planner leaves out: they count as those
+/// that cannot be seen, and whoever asks for them is told.
+fn nothing_is_left_out(spec: &Spec, survey: &Survey, planned: &Survey, out: &mut Vec<Finding>) {
+    let left_out = survey.n_coverable() - planned.n_coverable();
+    if left_out > 0 {
+        let field = match spec.mission.task {
+            CoverageTask::Area | CoverageTask::Exact => "area",
+            CoverageTask::Points(_) => "points",
+            CoverageTask::Lines(_) => "lines",
+        };
+        let text = format!(
+            "{left_out} of {} cells could be seen, but the planner finds no way to them: nobody looks for them, and the report counts them among those that cannot be seen",
+            survey.cells().len()
+        );
+        out.push(Finding::new(Severity::Warning, field, text));
+    }
+}
+
 fn enough_is_coverable(spec: &Spec, summary: &Summary, survey: &Survey, out: &mut Vec<Finding>) {
     let share = survey.coverable_share().min(summary.coverable_share);
     if share < spec.min_coverable {

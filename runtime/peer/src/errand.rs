@@ -351,8 +351,24 @@ mod tests {
         Arc::new(m)
     }
 
+    /// From outside of its zone nobody sees its middle.
+    fn widely_zoned() -> Arc<Mission> {
+        let mut m = (*zoned()).clone();
+        m.zones = vec![vec![
+            (150_000, 60_000),
+            (310_000, 60_000),
+            (310_000, 200_000),
+            (150_000, 200_000),
+        ]];
+        Arc::new(m)
+    }
+
     fn errand(task: &Task, from: Pose) -> Result<Errand, String> {
-        let geometry = zoned().geometry().unwrap();
+        errand_in(&zoned(), task, from)
+    }
+
+    fn errand_in(mission: &Arc<Mission>, task: &Task, from: Pose) -> Result<Errand, String> {
+        let geometry = mission.geometry().unwrap();
         let request = Request {
             geometry,
             task: task.clone(),
@@ -384,6 +400,8 @@ mod tests {
             (TaskKind::Pinpoint, vec![(900, -300)], 0),
             // Beside the zone, nearer than the clearance.
             (TaskKind::Pinpoint, vec![(195, 130)], 5),
+            // In the middle of it: what burns there is seen from outside.
+            (TaskKind::Pinpoint, vec![(230, 130)], 5),
             (TaskKind::Line, vec![(20, 250), (330, 250)], 5),
             (
                 TaskKind::Line,
@@ -474,10 +492,10 @@ mod tests {
     fn an_area_that_is_none_too_large_or_in_a_zone_is_refused() {
         let mut mission = (*wide()).clone();
         mission.zones = vec![vec![
-            (200_000, 80_000),
-            (360_000, 80_000),
-            (360_000, 240_000),
-            (200_000, 240_000),
+            (100_000, -20_000),
+            (460_000, -20_000),
+            (460_000, 340_000),
+            (100_000, 340_000),
         ]];
         let mission = Arc::new(mission);
         for (places, why) in [
@@ -511,15 +529,15 @@ mod tests {
     #[test]
     fn what_cannot_be_seen_is_refused_with_the_reason() {
         let from = Pose::new(Point::new(20.0, 20.0), 0.0);
+        let deep = task(TaskKind::Pinpoint, &[(230, 130)], 5);
+        let from_afar = Pose::new(Point::new(20.0, -120.0), 0.0);
+        let said = errand_in(&widely_zoned(), &deep, from_afar).unwrap_err();
+        assert!(said.contains("inside a no-fly zone"), "{said}");
+        assert!(widely_zoned().can_do(&deep).is_err());
         for (task, why) in [
-            (task(TaskKind::Pinpoint, &[(230, 130)], 5), "no-fly zone"),
             (
                 task(TaskKind::Pinpoint, &[(100, 100)], 60),
                 "larger than what one frame of the camera holds",
-            ),
-            (
-                task(TaskKind::Line, &[(205, 105), (255, 155)], 0),
-                "of the line cannot be seen",
             ),
             (task(TaskKind::Pinpoint, &[(90_000, 0)], 0), ""),
         ] {
@@ -527,5 +545,8 @@ mod tests {
             assert!(said.contains(why), "{said}");
             assert!(zoned().can_do(&task).is_err());
         }
+        let line = task(TaskKind::Line, &[(150, 130), (310, 130)], 0);
+        let said = errand_in(&widely_zoned(), &line, from_afar).unwrap_err();
+        assert!(said.contains("of the line cannot be seen"), "{said}");
     }
 }

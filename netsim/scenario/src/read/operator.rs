@@ -177,7 +177,7 @@ fn can_be_flown(mission: &Mission, spec: &Spec) -> Result<(), String> {
     let geometry = mission.geometry().map_err(|e| e.to_string())?;
     geometry.base_is_clear()?;
     let survey = Survey::of_mission(spec, &mission).map_err(|e| e.to_string())?;
-    let left_out = survey.left_out(&geometry);
+    let left_out = survey.left_out(&geometry).len();
     if left_out > 0 {
         return Err(format!(
             "the planner finds no way to {left_out} cells that could still be seen"
@@ -230,7 +230,7 @@ mod tests {
         assert_eq!(planned.n_coverable(), survey.n_coverable());
         // The loop of a mission for one lane leaves out the other one.
         let one = crate::load_builtin("convoy", &over).unwrap();
-        let left_out = survey.left_out(&one.geometry);
+        let left_out = survey.left_out(&one.geometry).len();
         assert!((5..planned.n_coverable()).contains(&left_out), "{left_out}");
     }
 

@@ -189,9 +189,7 @@ impl CadenceCheck {
 
     /// A belief changed. Whoever was heard is not suspected before k1 and not given up
     /// before k1 + k2 of its intervals, whoever says so: a suspicion counts from a heartbeat that is
-    /// no older than the last one heard from its author. Ages are rounded up to 100 ms
-    /// whenever they are passed on, and that of a suspicion is, by one peer after the other:
-    /// a quarter of k2 is room for eleven times, six were seen. Each waits by its own clock;
+    /// no older than the last one heard from its author. Each waits by its own clock;
     /// what is passed on was measured by others', which drift, and a late computer suspects
     /// somebody whose heartbeat waits for it.
     pub fn on_belief(
@@ -212,15 +210,11 @@ impl CadenceCheck {
             return;
         };
         let patience_ms = quarters * heard.interval_ms / 4;
-        let rounding_ms = match status {
-            Status::Down => LEAST_K2_QUARTERS * heard.interval_ms / 16,
-            _ => 0,
-        };
         let passed_on_ms = handicaps.grown_ms(patience_ms, heard.at_ms, now_ms) - patience_ms;
         let look_ms = self.period_ms / LOOKS_A_PERIOD;
         let (heard_ms, now) = (heard.at_ms, now_ms);
         let jumped_ms = handicaps.taken_for_listening_ms(observer, heard_ms, now, look_ms);
-        let slack_ms = 100 * (diameter + 1) + rounding_ms + passed_on_ms + jumped_ms;
+        let slack_ms = 100 * (diameter + 1) + passed_on_ms + jumped_ms;
         let silent_ms = handicaps.lived_ms(observer, heard.at_ms, now_ms);
         if silent_ms + slack_ms < patience_ms {
             found.broken("haste", now_ms, Some(observer), || {

@@ -382,7 +382,7 @@ mod tests {
             turn_radius_m: 20.0,
             slowest_mps: 12.0,
             fastest_mps: 12.0,
-            waits_beside_m: 0.0,
+            waits_within_m: 100.0,
         };
         let flyers = BTreeMap::from([(1, flyer)]);
         let handicaps = Handicaps::default();

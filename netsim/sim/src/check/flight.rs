@@ -15,7 +15,7 @@ const SETTLE_TURNS: f64 = 1.5;
 
 /// A circle at the least radius is no wider than two radii; a second circle lies beside it
 /// when the side was changed for the sake of a zone, and half of one is room for the wind.
-const HOLD_RADII: f64 = 5.0;
+pub(crate) const HOLD_RADII: f64 = 5.0;
 
 /// The way home is at most so many times the straight one, where no zone lies across that:
 /// turns, and the curve at the end.
@@ -36,8 +36,10 @@ pub struct Flyer {
     pub slowest_mps: f64,
     /// Its speed at cruise with the wind, m/s.
     pub fastest_mps: f64,
-    /// How far beside where it is to wait others may leave it room, metres.
-    pub waits_beside_m: f64,
+    /// How far from where all are to be it may wait, metres: circles of those who listen for a
+    /// station there are as wide as the widest UAV of the fleet turns, and where all fly at one
+    /// height others may leave it room beside theirs alone.
+    pub waits_within_m: f64,
 }
 
 /// Somebody who is to be home by then.
@@ -256,7 +258,7 @@ impl FlightCheck {
 /// Whether somebody who loiters at a base may be here.
 #[must_use]
 pub fn at_base(at: Point, base: Point, flyer: Flyer) -> bool {
-    (at - base).norm() <= HOLD_RADII * flyer.turn_radius_m + flyer.waits_beside_m
+    (at - base).norm() <= flyer.waits_within_m
 }
 
 #[allow(
@@ -270,8 +272,10 @@ pub(super) fn milliseconds(s: f64) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::rules::flyer;
     use super::super::testing::{Story, speaking};
     use super::*;
+    use crate::world::fixture;
     use skein_peer::Beliefs;
 
     /// Peer 1 at so many metres from base after each second; what is broken.
@@ -292,7 +296,7 @@ mod tests {
             turn_radius_m: 20.0,
             slowest_mps: 10.0,
             fastest_mps: 14.0,
-            waits_beside_m: 0.0,
+            waits_within_m: 100.0,
         };
         let mut check = FlightCheck::new(BTreeMap::from([(1, flyer)]), zones, 10.0);
         let (mut story, mut found) = (Story::new(300), Findings::new(1));
@@ -309,6 +313,21 @@ mod tests {
             });
         }
         found.counts
+    }
+
+    /// Where nobody hears the station all try circles as wide as the widest of them turns.
+    #[test]
+    fn who_turns_in_less_room_waits_no_nearer_to_the_base() {
+        let mut spec = fixture::square(2);
+        spec.uavs[0].airframe.cruise_mps /= 2.0;
+        let [narrow, wide] = [0, 1].map(|n| flyer(&spec.uavs[n], &spec));
+        assert!(narrow.turn_radius_m < wide.turn_radius_m / 3.0);
+        assert!((narrow.waits_within_m - wide.waits_within_m).abs() < 1e-9);
+        let (base, radius_m) = (Point::new(0.0, 0.0), spec.mission.turn_radius_m());
+        assert!(radius_m >= wide.turn_radius_m);
+        assert!(at_base(Point::new(4.0 * radius_m, 0.0), base, narrow));
+        let beyond = Point::new(wide.waits_within_m + 1.0, 0.0);
+        assert!(!at_base(beyond, base, wide));
     }
 
     #[test]

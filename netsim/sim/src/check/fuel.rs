@@ -364,7 +364,7 @@ mod tests {
                 turn_radius_m: 23.0,
                 slowest_mps: 13.0,
                 fastest_mps: 16.0,
-                waits_beside_m: 0.0,
+                waits_within_m: 115.0,
             };
             let flyers = BTreeMap::from([(1, flyer)]);
             let view = Beliefs {

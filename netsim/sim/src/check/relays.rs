@@ -183,7 +183,7 @@ mod tests {
         let flyer = Flyer {
             turn_radius_m: 30.0,
             fastest_mps: 15.0,
-            waits_beside_m: 0.0,
+            waits_within_m: 150.0,
             slowest_mps: 12.0,
         };
         BTreeMap::from([(1, flyer)])

@@ -8,7 +8,7 @@ use super::counts::CountCheck;
 use super::crowds::CrowdCheck;
 use super::decision::{DecisionCheck, Mover};
 use super::detections::DetectionCheck;
-use super::flight::{FlightCheck, Flyer, at_base};
+use super::flight::{FlightCheck, Flyer, HOLD_RADII, at_base};
 use super::footprint::FootprintCheck;
 use super::fuel::FuelCheck;
 use super::layers::LayerCheck;
@@ -444,11 +444,13 @@ fn base_of(bases: &BTreeMap<u32, Point>, revision: u32) -> Option<Point> {
 pub(crate) fn flyer(uav: &UavSpec, spec: &Spec) -> Flyer {
     let wind_mps = spec.wind.strongest().speed_mps();
     let airframe = &uav.airframe;
+    let turn_radius_m = airframe.ground_turn_radius_m(airframe.cruise_mps, wind_mps);
+    let circle_m = turn_radius_m.max(f64::from(spec.mission.turn_radius_mm) / 1e3);
     Flyer {
-        turn_radius_m: airframe.ground_turn_radius_m(airframe.cruise_mps, wind_mps),
+        turn_radius_m,
         slowest_mps: airframe.cruise_mps - wind_mps,
         fastest_mps: airframe.max_mps + wind_mps,
-        waits_beside_m: waits_beside_m(spec),
+        waits_within_m: HOLD_RADII * circle_m + waits_beside_m(spec),
     }
 }
 

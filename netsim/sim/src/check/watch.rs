@@ -197,7 +197,7 @@ mod tests {
             turn_radius_m: 20.0,
             slowest_mps: 12.0,
             fastest_mps: 12.0,
-            waits_beside_m: 0.0,
+            waits_within_m: 100.0,
         };
         let flyers: BTreeMap<u16, Flyer> = (1..9).map(|id| (id, flyer)).collect();
         let coverage_loop = &geometry.coverage_loop;

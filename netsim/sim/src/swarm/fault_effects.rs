@@ -292,7 +292,7 @@ impl Swarm {
             return;
         };
         let enough = survey.coverable_share() >= self.spec.min_coverable;
-        if enough && survey.left_out(&geometry) == 0 {
+        if enough && survey.left_out(&geometry).is_empty() {
             self.air.revise(Arc::new(survey), &geometry);
             self.account.revised();
             self.revise(next);

@@ -346,13 +346,14 @@ impl Board {
         if let Some(watch) = &mut self.watch {
             watch.see(i, sighting.at_ms);
         }
-        // Each cell counts from within the layer of its own next lap: the last one of a lap may
-        // have been seen in the middle of a picture, and one that need not be seen may be behind.
+        // Each cell counts for its own next lap, from within the layer of that: the last one of a
+        // lap may have been seen in the middle of a picture, and one that need not be seen may be
+        // behind.
         let lap = self.times[i].0.saturating_add(1);
         if self.seen[i].is_some() || !self.layers.counts(lap) {
             return;
         }
-        if !self.layers.is_flat() && lap < self.lap {
+        if lap < self.lap {
             self.times[i] = (lap, sighting.at_ms);
             self.marks += 1;
             return;

@@ -84,11 +84,15 @@ pub struct Site {
 
 impl Site {
     /// Prepares buildings and cells; the geometry is what the mission of the scenario gave,
-    /// if it gave any.
+    /// if it gave any: nobody looks for cells that its planner leaves out.
     #[must_use]
     pub fn new(spec: &Spec, geometry: Option<&MissionGeometry>) -> Self {
         let obstacles = Obstacles::new(&spec.buildings);
-        let survey = Arc::new(Survey::new(spec));
+        let survey = Survey::new(spec);
+        let survey = Arc::new(match geometry {
+            Some(geometry) => survey.as_planned(geometry),
+            None => survey,
+        });
         Self {
             open: Ground::of(&survey, &spec.mission, &obstacles),
             obstacles,
@@ -655,6 +659,10 @@ impl World {
             }
             self.flown.clear();
             u.body.advance(to_ms, &mut self.flown);
+            if self.flown.is_empty() && u.body.takes_off_in_ms(to_ms) == 0 {
+                // It takes off at this instant, and its camera shows what is below already.
+                self.flown.push(Piece::at(u.body.pose(), to_ms));
+            }
             for piece in &self.flown {
                 self.judge.watch(u.id, u.body.eye(), piece, &mut self.facts);
             }
@@ -791,6 +799,11 @@ mod tests {
     fn who_has_not_taken_off_stands_where_it_is() {
         let mut spec = fixture::square(2);
         spec.uavs[1].takeoff_ms = 3_000;
+        let at = spec.uavs[1].launch.position() / fixture::LANE_M;
+        let below = CellId {
+            col: at.x as i16,
+            row: at.y as i16,
+        };
         let mut w = World::new(&spec, 1);
         w.advance(1_200);
         let ground = w.percept(2).unwrap();
@@ -798,7 +811,13 @@ mod tests {
         assert_eq!(ground.pose, spec.uavs[1].launch);
         assert!(!w.apply(2, straight(1_200)), "it flies nothing yet");
         assert_eq!(w.percept(1).unwrap().takes_off_in_ms, 0);
+        w.advance(2_900);
+        assert!(w.judge().sighting(below).is_none());
         w.advance(3_000);
+        // Its percept of this instant shows what is below, and so does the judge.
+        assert_eq!(w.percept(2).unwrap().takes_off_in_ms, 0);
+        let seen = w.judge().sighting(below).unwrap();
+        assert_eq!((seen.at_ms, seen.uav), (3_000, 2));
         assert!(w.apply(2, straight(3_000)));
         w.advance(3_500);
         let air = w.percept(2).unwrap();

@@ -34,8 +34,8 @@ const OFFSET_M: f64 = 2.0;
 /// Side of the squares in which the free plane is flooded, metres: fine enough for a
 /// gap that is 2 m wider than twice the clearance.
 const RASTER_M: f64 = 2.0;
-/// A cell whose part inside the area is smaller is not a cell of the mission, m².
-const SLIVER_M2: f64 = 1e-3;
+/// A cell of which no larger share lies inside the area is not a cell of the mission.
+const SLIVER_SHARE: f64 = 1e-6;
 /// Most cells, lanes or raster squares of a bounding box; a mission beyond this is
 /// refused by the scenario's own check and has no cells here.
 const MAX_SQUARES: f64 = 16e6;
@@ -52,7 +52,7 @@ pub enum Uncoverable {
     CutOff,
     /// The mission asks only for what is farther from all zones than the clearance.
     NotAsked,
-    /// The planner finds no way to it, beside a zone that was added in flight.
+    /// The planner finds no way to it, though the world's own geometry has one.
     LeftOut,
 }
 
@@ -174,13 +174,14 @@ impl Survey {
         }))
     }
 
-    /// How many cells could be seen, and the planner leaves them out.
+    /// The cells that could be seen, and that the planner leaves out.
     #[must_use]
-    pub fn left_out(&self, geometry: &MissionGeometry) -> usize {
+    pub fn left_out(&self, geometry: &MissionGeometry) -> Vec<CellId> {
         let coverable = self.cells.iter().filter(|c| c.uncoverable.is_none());
         coverable
-            .filter(|c| !self.is_planned(geometry, c.id))
-            .count()
+            .map(|c| c.id)
+            .filter(|id| !self.is_planned(geometry, *id))
+            .collect()
     }
 
     /// The same without the cells that the planner leaves out: nobody will look for them.
@@ -356,6 +357,7 @@ impl Survey {
             floor_i32(b.max.y / self.lane_m),
         );
         self.size = (max.0 - self.min.0 + 1, max.1 - self.min.1 + 1);
+        let sliver_m2 = SLIVER_SHARE * self.lane_m * self.lane_m;
         for row in self.min.1..=max.1 {
             for col in self.min.0..=max.0 {
                 let square = self.square(col, row);
@@ -363,7 +365,7 @@ impl Survey {
                 let mut slot = 0;
                 // Where the middle stands for the square, it has to be in the area itself.
                 let middle = square.min + (square.max - square.min) / 2.0;
-                if part_m2 > SLIVER_M2 && (self.extent_m > 0.0 || in_ring(middle, area)) {
+                if part_m2 > sliver_m2 && (self.extent_m > 0.0 || in_ring(middle, area)) {
                     let (Ok(c), Ok(r)) = (i16::try_from(col), i16::try_from(row)) else {
                         continue;
                     };

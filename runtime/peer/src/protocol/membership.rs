@@ -482,7 +482,8 @@ impl Membership {
     }
 
     /// A heartbeat without anything else. Of a life it tells the last bits: of a peer that is
-    /// not known these are the life, until a higher one is heard of.
+    /// not known these are the life, until a higher one is heard of; else the life that is known
+    /// or one of the next, if it was sent later than what is known.
     fn on_fresh(
         &mut self,
         now: Time,
@@ -491,19 +492,22 @@ impl Membership {
         limits: Patience,
         changes: &mut Vec<Change>,
     ) {
-        let life = self.known.get(&told.id).map(|k| k.freshest.incarnation);
-        let incarnation = life.unwrap_or(Incarnation::from(told.life));
-        if incarnation == 0 || Fresh::life_of(incarnation) != told.life {
+        let age = Age {
+            told_ms: u64::from(told.age_ds) * 100 + self.waited_ms(now),
+            at: now,
+        };
+        let incarnation = match self.known.get(&told.id) {
+            Some(known) => known.life_told(now, told.life, age),
+            None => Some(Incarnation::from(told.life)).filter(|life| *life > 0),
+        };
+        let Some(incarnation) = incarnation else {
             return;
-        }
+        };
         let heartbeat = HeardHeartbeat {
             id: told.id,
             incarnation,
             count: told.heartbeat,
-            age: Age {
-                told_ms: u64::from(told.age_ds) * 100 + self.waited_ms(now),
-                at: now,
-            },
+            age,
             hops: told.hops.saturating_add(1),
             interval: told.interval,
             suspected: told.suspected_ds.map(|ds| Age {

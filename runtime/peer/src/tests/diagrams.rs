@@ -300,7 +300,7 @@ fn who_loses_a_peer_comes_home_until_it_is_back_if_the_mission_says_so() {
     let lost = (MissionEvent::PeerLost, 0);
     let diagram = with("gather", StateGoal::Home, Part::Releases, lost);
     let mut h = with_operator(3, flown_by(diagram, 1));
-    h.run_s(30);
+    h.run_s(20);
     assert_eq!(work(&h, 1).state, "section");
     h.isolate(3, true);
     assert!(h.run_until(60, |h| work(h, 1).state == "gather"));

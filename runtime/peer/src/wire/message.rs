@@ -142,10 +142,13 @@ pub struct Fresh {
 }
 
 impl Fresh {
+    /// The bits of a life that are told.
+    pub const LIFE_BITS: u8 = 7;
+
     /// What is told of a life: consecutive ones differ.
     #[must_use]
     pub fn life_of(incarnation: Incarnation) -> u8 {
-        u8::try_from(incarnation & 7).unwrap_or(0)
+        u8::try_from(incarnation & Incarnation::from(Self::LIFE_BITS)).unwrap_or(0)
     }
 }
 

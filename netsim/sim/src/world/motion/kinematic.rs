@@ -60,6 +60,18 @@ pub struct Piece {
 }
 
 impl Piece {
+    /// An instant of it.
+    pub fn at(pose: Pose, at_ms: u64) -> Self {
+        Self {
+            from_ms: at_ms,
+            to_ms: at_ms,
+            start: pose,
+            speed_mps: 0.0,
+            turn_rate_radps: 0.0,
+            wind: Wind::default(),
+        }
+    }
+
     /// Length in metres; in a wind the most that it can be over the ground.
     #[must_use]
     pub fn length_m(&self) -> f64 {

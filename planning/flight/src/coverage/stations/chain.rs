@@ -18,6 +18,11 @@ use std::collections::{BTreeMap, BTreeSet};
 /// blocked. Each takes up to milliseconds.
 const ROUTES_A_LEG: u8 = 6;
 
+/// Where a station that was left out is put into the chain after all: so many ways by a pose of
+/// it, the shortest first, are held against the zones, and for so many routes are searched.
+const DETOURS: usize = 128;
+const ROUTED_DETOURS: usize = 12;
+
 /// Two poses closer than this are the same: what joins them is a full circle.
 const SAME_M: f64 = 1e-2;
 const SAME_RAD: f64 = 1e-3;
@@ -74,7 +79,7 @@ pub(super) struct Chain<'a> {
     stands: Vec<(usize, Vec<Pose>)>,
     /// By station of departure: poses of departure times poses of arrival.
     legs: Vec<Legs>,
-    routed: Vec<u8>,
+    tries: Vec<u8>,
     /// By station: how often a leg from or to it was blocked.
     blame: BTreeMap<usize, u32>,
     /// What was left out, with one more chance when the other end of the leg that was
@@ -103,7 +108,7 @@ impl<'a> Chain<'a> {
             problem,
             router,
             legs: Vec::new(),
-            routed: vec![0; stands.len()],
+            tries: vec![0; stands.len()],
             blame: BTreeMap::new(),
             left: Vec::new(),
             returned: BTreeSet::new(),
@@ -120,13 +125,69 @@ impl<'a> Chain<'a> {
             match self.choose() {
                 Some(poses) => {
                     if let Some(visits) = self.realise(&poses) {
-                        return (visits, self.left.iter().map(|l| l.station).collect());
+                        return self.put_in(visits);
                     }
                 }
                 None => self.give_up(),
             }
         }
         (Vec::new(), self.left.iter().map(|l| l.station).collect())
+    }
+
+    /// What was left out has no way from or to those beside it in the order: it is flown between
+    /// two others, if there is a way. The stations as they are flown, and the numbers of those
+    /// that nothing reaches.
+    fn put_in(&self, mut visits: Vec<Visit>) -> (Vec<Visit>, Vec<usize>) {
+        let mut left: Vec<&Left> = self.left.iter().collect();
+        // One that is put in may lead to the next.
+        loop {
+            let before = left.len();
+            left.retain(|l| match self.detour(&visits, &l.stands) {
+                Some((at, there, onward)) => {
+                    visits[at].onward = there;
+                    let station = l.station;
+                    visits.insert(at + 1, Visit { station, onward });
+                    false
+                }
+                None => true,
+            });
+            if left.is_empty() || left.len() == before {
+                return (visits, left.iter().map(|l| l.station).collect());
+            }
+        }
+    }
+
+    /// After which visit a station is flown at one of these poses, and the curves there and on.
+    fn detour(&self, visits: &[Visit], stands: &[Pose]) -> Option<(usize, Curve, Curve)> {
+        let r = self.problem.turn_radius_m;
+        let guess_m = |from: Pose, to: Pose| {
+            if same(from, to) {
+                TAU * r
+            } else {
+                dubins::length_m(from, to, r)
+            }
+        };
+        let starts: Vec<Pose> = visits.iter().filter_map(|v| v.onward.start()).collect();
+        let mut ways = Vec::with_capacity(starts.len() * stands.len());
+        for (at, &from) in starts.iter().enumerate() {
+            let to = starts[(at + 1) % starts.len()];
+            for &by in stands {
+                let more_m = guess_m(from, by) + guess_m(by, to) - visits[at].onward.length_m();
+                ways.push((more_m, at, from, by, to));
+            }
+        }
+        ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (routes, tries) in [(false, DETOURS), (true, ROUTED_DETOURS)] {
+            for &(_, at, from, by, to) in ways.iter().take(tries) {
+                let Some(there) = self.linked(from, by, routes) else {
+                    continue;
+                };
+                if let Some(onward) = self.linked(by, to, routes) {
+                    return Some((at, there, onward));
+                }
+            }
+        }
+        None
     }
 
     fn next(&self, i: usize) -> usize {
@@ -259,28 +320,35 @@ impl<'a> Chain<'a> {
     /// A curve from pose to pose that keeps clear: a Dubins word, else a route round
     /// the zones.
     fn flown(&mut self, i: usize, a: usize, b: usize) -> Leg {
-        let r = self.problem.turn_radius_m;
         let (from, to) = (self.stands[i].1[a], self.stands[self.next(i)].1[b]);
+        if let Some(direct) = self.linked(from, to, false) {
+            return Leg::Clear(direct);
+        }
+        if same(from, to) || self.tries[i] == ROUTES_A_LEG {
+            return Leg::Blocked;
+        }
+        self.tries[i] += 1;
+        self.routed(from, to).map_or(Leg::Blocked, Leg::Clear)
+    }
+
+    /// A curve from pose to pose that keeps clear: a Dubins word, else, where that is asked for, a
+    /// route round the zones.
+    fn linked(&self, from: Pose, to: Pose, routes: bool) -> Option<Curve> {
+        let r = self.problem.turn_radius_m;
         if same(from, to) {
-            return [1.0, -1.0]
-                .map(|turn| Curve::from_pieces(from, &[(turn / r, TAU * r)]))
-                .into_iter()
-                .find(|c| self.problem.flyable(c))
-                .map_or(Leg::Blocked, Leg::Clear);
+            let circles = [1.0, -1.0].map(|turn| Curve::from_pieces(from, &[(turn / r, TAU * r)]));
+            return circles.into_iter().find(|c| self.problem.flyable(c));
         }
         let shortest = dubins::shortest(from, to, r);
         if self.problem.flyable(&shortest) {
-            return Leg::Clear(shortest);
+            return Some(shortest);
         }
-        if self.routed[i] == ROUTES_A_LEG {
-            return Leg::Blocked;
-        }
-        self.routed[i] += 1;
-        self.router
-            .route(from, to)
-            .ok()
-            .filter(|c| self.problem.flyable(c))
-            .map_or(Leg::Blocked, Leg::Clear)
+        routes.then(|| self.routed(from, to)).flatten()
+    }
+
+    fn routed(&self, from: Pose, to: Pose) -> Option<Curve> {
+        let way = self.router.route(from, to).ok();
+        way.filter(|c| self.problem.flyable(c))
     }
 
     /// Leaves out one end of a leg that has no way left, the one that was in the way more often;
@@ -338,7 +406,7 @@ impl<'a> Chain<'a> {
     fn leave_out(&mut self, i: usize) -> (usize, Vec<Pose>) {
         let out = self.stands.remove(i);
         self.legs.remove(i);
-        self.routed.remove(i);
+        self.tries.remove(i);
         let n = self.stands.len();
         if n > 0 {
             self.renew((i + n - 1) % n);
@@ -351,7 +419,7 @@ impl<'a> Chain<'a> {
         let i = self.stands.partition_point(|s| self.rank[&s.0] < rank);
         self.stands.insert(i, (station, stands));
         self.legs.insert(i, Legs::default());
-        self.routed.insert(i, 0);
+        self.tries.insert(i, 0);
         let n = self.stands.len();
         self.renew(i);
         self.renew((i + n - 1) % n);
@@ -359,7 +427,7 @@ impl<'a> Chain<'a> {
 
     /// Forgets what is known of a leg whose other end has changed.
     fn renew(&mut self, i: usize) {
-        self.routed[i] = 0;
+        self.tries[i] = 0;
         self.legs[i] = self.guesses(i);
     }
 }

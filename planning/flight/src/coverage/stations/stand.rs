@@ -43,13 +43,12 @@ pub(super) fn stands(problem: &StationsProblem<'_>, n: usize) -> Result<Vec<Pose
     if !clear.is_empty() {
         return Ok(clear);
     }
-    let inside = |p: &Point| problem.flown.zones.distance_m(*p) <= 0.0;
-    if station.iter().all(inside) {
-        return Err("inside a no-fly zone");
-    }
     let beside = beside(problem, station, &lens);
     if beside.is_empty() {
-        return Err(if lens.ever_holds(station) {
+        let inside = |p: &Point| problem.flown.zones.distance_m(*p) <= 0.0;
+        return Err(if station.iter().all(inside) {
+            "inside a no-fly zone"
+        } else if lens.ever_holds(station) {
             "no straight pass that sees all of it keeps clear of the no-fly zones"
         } else {
             "larger than what one frame of the camera holds"
@@ -81,12 +80,35 @@ fn beside(problem: &StationsProblem<'_>, station: &Corners, lens: &Lens) -> Vec<
         }
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    found
-        .into_iter()
-        .map(|(_, pose)| pose)
-        .filter(|&pose| problem.flown.flyable(&run(pose)))
-        .take(MOST)
-        .collect()
+    let found = || found.iter().map(|(_, pose)| *pose);
+    let flyable = |pose: &Pose| problem.flown.flyable(&run(*pose));
+    let mut poses: Vec<Pose> = found().filter(flyable).take(MOST).collect();
+    if poses.len() == MOST && !poses.iter().any(|pose| has_room(problem, *pose)) {
+        // The nearest all lie where nobody can turn: half of them for such that do not.
+        poses.truncate(MOST / 2);
+        let roomy = found().filter(|pose| has_room(problem, *pose));
+        poses.extend(roomy.filter(flyable).take(MOST - MOST / 2));
+    }
+    poses
+}
+
+/// Whether a UAV can come from a circle and leave on one: the straight half a lane before the pose
+/// and after is clear, and at each of its ends a circle on one side.
+fn has_room(problem: &StationsProblem<'_>, pose: Pose) -> bool {
+    let flown = problem.flown;
+    let (r, half_m) = (flown.turn_radius_m, flown.lane_spacing_m / 2.0);
+    let (at, ahead) = (pose.position(), pose.direction());
+    let left = Vector::new(-ahead.y, ahead.x);
+    let is_circled = |end: Point| {
+        let sides = [left, -left].map(|side| flown.zones.distance_m(end + side * r));
+        sides.iter().any(|m| *m >= r + flown.clearance_m)
+    };
+    [at - ahead * half_m, at + ahead * half_m]
+        .iter()
+        .all(|end| is_circled(*end))
+        && flown
+            .zones
+            .is_clear(&straight(pose, half_m), flown.clearance_m)
 }
 
 /// Zero, and both sides outwards in steps up to the limit.
@@ -127,6 +149,14 @@ impl Lens {
 
 /// The short straight through a pose.
 pub(super) fn run(pose: Pose) -> Curve {
-    let start = Pose::new(pose.position() - pose.direction() * RUN_M, pose.heading_rad);
-    Curve::from_pieces(start, &[(0.0, 2.0 * RUN_M)])
+    straight(pose, RUN_M)
+}
+
+/// The straight so far before a pose and after it.
+fn straight(pose: Pose, half_m: f64) -> Curve {
+    let start = Pose::new(
+        pose.position() - pose.direction() * half_m,
+        pose.heading_rad,
+    );
+    Curve::from_pieces(start, &[(0.0, 2.0 * half_m)])
 }

@@ -33,9 +33,15 @@ impl Age {
         Time(self.at.0.saturating_sub(self.told_ms))
     }
 
-    /// As it is told: 100 ms units, rounded up.
+    /// As that of a heartbeat is told: 100 ms units, rounded up. Who is dead is no younger for it.
     fn ds(self, now: Time) -> u16 {
         u16::try_from(self.ms(now).div_ceil(100)).unwrap_or(u16::MAX)
+    }
+
+    /// As that of a suspicion is told: 100 ms units, rounded down. Of several the oldest counts:
+    /// rounded up it would grow whenever somebody passes it on.
+    fn full_ds(self, now: Time) -> u16 {
+        u16::try_from(self.ms(now) / 100).unwrap_or(u16::MAX)
     }
 }
 
@@ -198,6 +204,9 @@ const BEHIND: u32 = 4;
 /// more meanwhile.
 const LAG_INTERVALS: u64 = 4;
 
+/// Of so many further lives the bits that are told are taken for a later one.
+const LIVES_AHEAD: u8 = 3;
+
 /// Who began a life anew without knowing is told so again after so many intervals.
 const REMINDER_INTERVALS: u64 = 2;
 
@@ -246,6 +255,16 @@ impl Known {
         if let Some(suspected) = &mut self.freshest.suspected {
             suspected.at = suspected.at.plus_ms(late_ms).min(now);
         }
+    }
+
+    /// Which life the last bits of it mean, told with a heartbeat of that age: this one, or one of
+    /// the next if that was sent later than the freshest heartbeat that is known.
+    pub(super) fn life_told(&self, now: Time, bits: u8, age: Age) -> Option<Incarnation> {
+        let mine = &self.freshest;
+        let ahead = bits.wrapping_sub(Fresh::life_of(mine.incarnation)) & Fresh::LIFE_BITS;
+        let is_later = age.ms(now) < mine.age.ms(now);
+        let is_meant = ahead == 0 || (ahead <= LIVES_AHEAD && is_later);
+        is_meant.then(|| mine.incarnation.saturating_add(Incarnation::from(ahead)))
     }
 
     /// Whether a heartbeat of this life says nothing that is not known: it is no later than the
@@ -567,7 +586,7 @@ impl Known {
             hops: self.distance(now, interval_ms),
             interval,
             able: self.info.able,
-            suspected_ds: self.freshest.suspected.map(|age| age.ds(now)),
+            suspected_ds: self.freshest.suspected.map(|age| age.full_ds(now)),
         }
     }
 
@@ -596,7 +615,7 @@ impl Known {
             age_ds: heard.age.ds(now),
             hops: self.distance(now, interval_ms),
             interval: heard.interval,
-            suspected_ds: heard.suspected.map(|age| age.ds(now)),
+            suspected_ds: heard.suspected.map(|age| age.full_ds(now)),
             able: self.info.able,
             max_seq: 0,
             digest: 0,

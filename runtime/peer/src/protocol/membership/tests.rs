@@ -723,6 +723,45 @@ fn a_heartbeat_alone_counts_for_the_life_that_is_known_or_the_least_it_can_be() 
     assert_eq!(m.status(7), Some((1, Status::Alive)), "the least such life");
 }
 
+/// Peer 2 is known in life 9, by a heartbeat that was sent 10 s ago, and was held for down.
+#[test]
+fn a_heartbeat_alone_tells_of_one_of_the_next_lives_if_it_was_sent_later() {
+    let mut known = Membership::new(1, 1000);
+    known.on_beacon(Time(0), 2, 9, &beacon(500, Vec::new()));
+    for t in 1..=60 {
+        known.tick(Time(1_000 * t));
+    }
+    assert_eq!(known.status(2), Some((9, Status::Down)));
+    let now = Time(60_000);
+    let heard = |life: u8, age_ds: u16| {
+        let mut m = known.clone();
+        let told = Fresh {
+            id: 2,
+            life,
+            heartbeat: 3,
+            age_ds,
+            hops: 1,
+            interval: 8,
+            able: true,
+            suspected_ds: None,
+        };
+        let changes = m.on_others(now, 3, &[told]);
+        assert_eq!(changes.is_empty(), m.status(2) == known.status(2));
+        m.status(2)
+    };
+    // Of 9 the bits are 1; 10 to 12 are the next.
+    for (bits, life) in [(2, 10), (3, 11), (4, 12)] {
+        assert_eq!(heard(bits, 20), Some((life, Status::Alive)));
+        // Whoever was sent before is of an earlier life, of which there is one with these bits.
+        assert_eq!(heard(bits, 601), Some((9, Status::Down)));
+    }
+    for bits in [0, 5, 6, 7] {
+        assert_eq!(heard(bits, 20), Some((9, Status::Down)), "{bits}");
+    }
+    // A lower count of the life that is known is none of it.
+    assert_eq!(heard(1, 20), Some((9, Status::Down)));
+}
+
 #[test]
 fn made_up_ids_do_not_displace_the_living() {
     let mut m = Membership::new(1, 1000);
