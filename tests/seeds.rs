@@ -1,4 +1,4 @@
-//! Replays the seeds that once failed (`tests/seeds/*.txt`: scenario, seed, `storm` if its
+//! Replays the seeds that once failed (`tests/seeds/*.txt`: scenario or `drawn:NUMBER`, seed, `storm` if its
 //! faults are drawn, where the UAVs begin, `own` for where the scenario says, and `uavs=2` for
 //! another number of them, one a line). Each must complete and break no rule, and the first must
 //! give the same history twice.
@@ -8,6 +8,7 @@ use skein_netsim::runs::{self, Wanted};
 use skein_netsim::spec::Spec;
 use skein_netsim::swarm::Outcome;
 use skein_netsim::world::fixture;
+use skein_scenario::drawn::drawn;
 use skein_scenario::{Launch, Overrides, builtin_files, builtin_text, open, parse_with};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,6 +31,13 @@ fn prepared(scenario: &str, launch: Option<Launch>, uavs: Option<u16>) -> Prepar
             spec
         }
         "walls" => walls(),
+        name if name.starts_with("drawn:") => {
+            let number = name
+                .trim_start_matches("drawn:")
+                .parse()
+                .expect("drawn:NUMBER");
+            drawn(number).expect("it can be flown").scenario.spec
+        }
         name => {
             let over = Overrides {
                 launch,

@@ -11,6 +11,7 @@ mod auction;
 mod configs;
 mod d27;
 mod documents;
+mod drawn;
 mod flown_plans;
 mod fuel;
 mod many;

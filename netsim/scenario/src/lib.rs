@@ -21,6 +21,7 @@
 //! | [`diagram`] | diagrams of missions, built in and from files, and pictures of them |
 //! | [`town`] | streets and buildings without a mission |
 //! | `coverable` | what the world's own geometry says of the same area |
+//! | [`drawn`] | scenarios drawn from a seed, to try what nobody thought of |
 //!
 //! ```
 //! let spec = skein_scenario::builtin(skein_scenario::DEFAULT).unwrap();
@@ -37,6 +38,7 @@ mod coverable;
 #[cfg(test)]
 mod detected;
 pub mod diagram;
+pub mod drawn;
 mod error;
 mod feasibility;
 mod files;
