@@ -3,7 +3,8 @@
 //!
 //! Whatever asks for a flight, what leaves here can be flown: the airspeed keeps
 //! above the stall, in the steepest turn too, turns keep the bank limit, numbers are numbers, and a flight
-//! that would come too near to a zone is replaced by a loiter on the clearer side.
+//! that would come too near to a zone is replaced by a loiter on the clearer side. So is one that
+//! leads to where no loiter is clear of the zones any more, as long as one is.
 //! Height belongs to the UAV's slot and is passed through.
 //!
 //! # Complexity
@@ -37,6 +38,10 @@ const CHORD_S: f64 = 0.25;
 /// A side of the failsafe loiter is changed only for this much more room, metres, so
 /// that rounding does not swap it back and forth.
 const SIDE_MARGIN_M: f64 = 0.5;
+
+/// As far at least from a zone is a loiter that is clear of it, metres: what flying it may stray.
+/// One that is flown is clear until it is half as far, so that rounding does not end it.
+const CLEAR_M: f64 = 3.0;
 
 /// Checks setpoints of one UAV.
 #[derive(Clone, Debug)]
@@ -122,10 +127,48 @@ impl Envelope {
             self.side = self.choose_side(&percept.pose);
         }
         out.loiter = self.side;
-        if !finite || out.steps.is_empty() || self.too_near(percept, &out, looks_s) {
+        if !finite || out.steps.is_empty() {
+            out.steps = self.loiter_steps(&percept.pose, limit);
+        } else if let Some(side) = self.way_out(percept, &out, looks_s) {
+            self.side = side;
+            out.loiter = side;
             out.steps = self.loiter_steps(&percept.pose, limit);
         }
         out
+    }
+
+    /// The side of a loiter that is clear of the zones now, where none will be any more once the
+    /// commanded flight has gone on for as long as nobody may say anything else.
+    fn last_way_out(&self, percept: &Percept, setpoint: &Setpoint) -> Option<Side> {
+        let v = setpoint.airspeed_mps;
+        let radius_m = self
+            .circle_radius_m()
+            .unwrap_or_else(|| self.airframe.turn_radius_m(v));
+        let (pose, wind) = (&percept.pose, wind_of(percept));
+        let is_clear = |pose: &Pose, side: Side, by_m: f64| {
+            let middle = self.middle(pose, side, radius_m);
+            self.near.distance_m(middle) >= radius_m + by_m
+        };
+        let then = flown(pose, setpoint, wind, FAILSAFE_S);
+        let sides = match self.side {
+            Side::Left => [Side::Left, Side::Right],
+            Side::Right => [Side::Right, Side::Left],
+        };
+        if sides.iter().any(|side| is_clear(&then, *side, CLEAR_M)) {
+            return None;
+        }
+        let mut sides = sides.into_iter();
+        sides.find(|side| is_clear(pose, *side, CLEAR_M / 2.0))
+    }
+
+    /// The middle of the loiter on a side that begins at a pose.
+    fn middle(&self, pose: &Pose, side: Side, radius_m: f64) -> Point {
+        let d = self.air.over_ground(*pose).direction();
+        let out_m = match side {
+            Side::Left => radius_m,
+            Side::Right => -radius_m,
+        };
+        Point::new(pose.east_m - out_m * d.y, pose.north_m + out_m * d.x)
     }
 
     /// The loiter on the chosen side: the sharpest turn, in a wind the circle over the
@@ -223,11 +266,7 @@ impl Envelope {
         let circle_m = self.circle_radius_m();
         let radius_m = circle_m.unwrap_or(self.airframe.min_turn_radius_m());
         let d = self.air.over_ground(*pose).direction();
-        let out = match side {
-            Side::Left => radius_m,
-            Side::Right => -radius_m,
-        };
-        let centre = Point::new(pose.east_m - out * d.y, pose.north_m + out * d.x);
+        let centre = self.middle(pose, side, radius_m);
         let fastest_mps = match circle_m {
             Some(_) => self.air.airspeed_mps + self.air.wind.speed_mps(),
             None => self.airframe.cruise_mps,
@@ -239,20 +278,26 @@ impl Envelope {
             - radius_m
     }
 
-    /// Whether the commanded flight comes too near to a zone and a loiter does not
-    /// come as near.
-    fn too_near(&self, percept: &Percept, setpoint: &Setpoint, looks_s: f64) -> bool {
+    /// The side of the loiter that is flown instead of a commanded flight that comes too near to a
+    /// zone: the chosen one, if that does not come as near; else the last that is clear.
+    fn way_out(&self, percept: &Percept, setpoint: &Setpoint, looks_s: f64) -> Option<Side> {
         let (pose, wind) = (&percept.pose, wind_of(percept));
         if self.near.zones().is_empty() {
-            return false;
+            return None;
         }
         let reach_m = (setpoint.airspeed_mps + wind.norm()) * HORIZON_S;
         if self.near.distance_m(pose.position()) - reach_m >= self.least_m {
-            return false;
+            return None;
         }
-        let commanded = self.flight_distance_m(pose, setpoint, wind, looks_s);
-        commanded < self.least_m
-            && self.loiter_distance_m(pose, setpoint.airspeed_mps, wind) > commanded + 1e-6
+        let commanded_m = self.flight_distance_m(pose, setpoint, wind, looks_s);
+        if commanded_m >= self.least_m {
+            return None;
+        }
+        let loiter_m = self.loiter_distance_m(pose, setpoint.airspeed_mps, wind);
+        if loiter_m > commanded_m + 1e-6 {
+            return Some(self.side);
+        }
+        self.last_way_out(percept, setpoint)
     }
 
     /// Distance of the commanded flight over some seconds from the nearest zone, metres.
@@ -348,6 +393,25 @@ fn wind_of(percept: &Percept) -> Vector {
     } else {
         Vector::zeros()
     }
+}
+
+/// Where a commanded flight is after some seconds.
+fn flown(pose: &Pose, setpoint: &Setpoint, wind: Vector, for_s: f64) -> Pose {
+    let v = setpoint.airspeed_mps;
+    let (mut at, mut left_s) = (*pose, for_s);
+    for (i, s) in setpoint.steps.iter().enumerate() {
+        let last = i + 1 == setpoint.steps.len();
+        let lasts_s = f64::from(s.duration_ms) / 1000.0;
+        let part_s = if last { left_s } else { left_s.min(lasts_s) };
+        let piece = Segment {
+            start: at,
+            curvature_per_m: s.turn_rate_radps / v,
+            length_m: v * part_s,
+        };
+        at = drifted(piece.end(), wind * part_s);
+        left_s -= part_s;
+    }
+    at
 }
 
 fn drifted(pose: Pose, by: Vector) -> Pose {
@@ -497,6 +561,29 @@ mod tests {
             straight(13.0),
         );
         assert!(out.steps[0].turn_rate_radps.abs() < 1e-12);
+    }
+
+    /// A gap between two zones becomes too narrow for a circle; the flight is nowhere nearer than
+    /// the circles are, so the clearance alone lets it go on.
+    #[test]
+    fn nobody_flies_to_where_no_loiter_is_clear() {
+        let wedge = |side: f64| {
+            let corners = [(400.0, 15.0), (400.0, 200.0), (0.0, 200.0), (0.0, 65.0)];
+            let corners = corners.map(|(x, y)| Point::new(x, side * y));
+            skein_geometry::Polygon::new(corners.to_vec()).unwrap()
+        };
+        let zones = [wedge(1.0), wedge(-1.0)];
+        let mut e = Envelope::new(airframe(), Arc::new(NoFlyZones::new(zones.to_vec())), 60.0);
+        let mut pose = Pose::new(Point::new(-100.0, 0.0), 0.0);
+        let (mut nearest_m, mut held) = (f64::INFINITY, 0);
+        for i in 0..400 {
+            let out = e.check(&percept_at(pose, i * 200), straight(13.0));
+            held += u32::from(out.steps[0].turn_rate_radps.abs() > 0.1);
+            pose = crate::reactive::follow::fly(pose, out.airspeed_mps, &out.steps, 200);
+            let away_m = zones.iter().map(|z| z.distance_m(pose.position()));
+            nearest_m = away_m.fold(nearest_m, f64::min);
+        }
+        assert!(held > 20 && nearest_m > CLEAR_M - 1.0, "{held} {nearest_m}");
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Storms of missions that nobody thought of, one scenario a seed:
 //! `cargo run --release -p skein-scenario --example drawn -- 0..100`.
 //!
-//! A second argument says how many storms of each are flown, 2 without it; of one seed it may be
-//! `text`, and the scenario is printed as it would stand in a file. Prints a line for each
+//! The first argument may be one seed alone, too. A second one says how many storms of each are
+//! flown, 2 without it; if it is `text`, the scenario is printed as it would stand in a file. Prints a line for each
 //! scenario, and what broke. Exit code 1 if anything did.
 
 use skein_netsim::prepared::Prepared;
@@ -15,7 +15,14 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let mut args = std::env::args().skip(1);
     let seeds = args.next().unwrap_or_else(|| "0..20".to_owned());
-    let Seeds { from, to } = match seeds.parse() {
+    let one = seeds.parse::<u64>().ok();
+    let one = one.and_then(|n| {
+        Some(Seeds {
+            from: n,
+            to: n.checked_add(1)?,
+        })
+    });
+    let Seeds { from, to } = match one.map_or_else(|| seeds.parse(), Ok) {
         Ok(seeds) => seeds,
         Err(e) => {
             eprintln!("{e}");

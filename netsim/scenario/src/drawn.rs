@@ -46,11 +46,17 @@ pub fn drawn(seed: u64) -> Result<Drawn, ScenarioError> {
         let name = format!("drawn-{seed}.json5");
         match parse_with(&name, &text, &files(), &Overrides::default()) {
             Ok(scenario) => {
-                return Ok(Drawn {
-                    text,
-                    scenario,
-                    refused,
-                });
+                // Those who are left after a storm are to have the fuel for all of it.
+                let scarce = scenario.findings.iter().find(|f| f.field == "airframes");
+                let Some(scarce) = scarce else {
+                    return Ok(Drawn {
+                        text,
+                        scenario,
+                        refused,
+                    });
+                };
+                refused.push(scarce.to_string());
+                parts.mend("airframes", &scarce.problem, &mut random);
             }
             Err(ScenarioError::Invalid(e)) => {
                 refused.push(e.to_string());
@@ -287,7 +293,7 @@ impl Parts {
             "[\"first\"]"
         };
         format!(
-            "{{\n  name: \"drawn-{seed}\", seed: {seed}, time_scale: 8, max_time_s: 8000,\n  \
+            "{{\n  name: \"drawn-{seed}\", seed: {seed}, time_scale: 8, max_time_s: 20000,\n  \
              origin: {{ lat_deg: 60.1655, lon_deg: 24.9355 }},\n  \
              {asked},\n  no_fly: [{zones}],\n  {more}{style}level_m: {level_m},\n  \
              lanes: {{ spacing_m: {spacing_m}, tracking_error_m: 3 }},\n  base: {base},\n  \

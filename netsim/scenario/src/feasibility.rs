@@ -14,7 +14,7 @@ use skein_netsim::fault_generator::kills;
 use skein_netsim::spec::{Spec, UavSpec};
 use skein_netsim::world::Survey;
 use skein_peer::CoverageTask;
-use skein_peer::mission::GeometryError;
+use skein_peer::mission::{GeometryError, point_m};
 use skein_peer::offload::MissionGeometry;
 use skein_peer::wire::limits::PEERS_MAX;
 use std::collections::{BTreeMap, BTreeSet};
@@ -273,6 +273,26 @@ fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut
     }
     launches(spec, geometry, out);
     room_at_base(spec, geometry, out);
+    moved_bases(spec, geometry, out);
+}
+
+/// Where the base is moved while it is flown nobody can come home to within the clearance.
+fn moved_bases(spec: &Spec, geometry: &MissionGeometry, out: &mut Vec<Finding>) {
+    let clearance_m = spec.mission.clearance_m();
+    for f in &spec.faults {
+        let Fault::Rebase { east_mm, north_mm } = f.fault else {
+            continue;
+        };
+        let base = point_m((east_mm, north_mm));
+        let base_m = geometry.router.zones().distance_m(base);
+        if base_m < clearance_m {
+            let text = format!(
+                "the base that is given at {} s is {base_m:.1} m from a no-fly zone; expected at least the clearance of {clearance_m:.1} m",
+                f.at_ms / 1000
+            );
+            out.push(Finding::new(Severity::Error, "faults", text));
+        }
+    }
 }
 
 /// Who has finished waits on a circle through the base.

@@ -66,7 +66,11 @@ impl Swarm {
                 let base = (*east_mm, *north_mm);
                 let before = (**self.operator.mission()).clone();
                 let next = self.next_mission(Mission { base, ..before });
-                self.revise(next);
+                // A console refuses one that nobody can fly to.
+                let geometry = self.geometry_cache.of(&next);
+                if geometry.is_ok_and(|g| g.base_is_clear().is_ok()) {
+                    self.revise(next);
+                }
                 0
             }
             Fault::Revise { area, zones, task } => {
@@ -292,7 +296,8 @@ impl Swarm {
             return;
         };
         let enough = survey.coverable_share() >= self.spec.min_coverable;
-        if enough && survey.left_out(&geometry).is_empty() {
+        let flown = enough && geometry.base_is_clear().is_ok();
+        if flown && survey.left_out(&geometry).is_empty() {
             self.air.revise(Arc::new(survey), &geometry);
             self.account.revised();
             self.revise(next);
