@@ -137,6 +137,11 @@ impl CadenceCheck {
         self.slowest.insert(id, self.interval_ms(id));
     }
 
+    /// What its author announced last, as far as is known.
+    fn latest_ms(&self, id: u16) -> u64 {
+        self.announced.get(&id).copied().unwrap_or(u64::MAX)
+    }
+
     fn interval_ms(&self, id: u16) -> u64 {
         self.announced.get(&id).copied().unwrap_or(self.period_ms)
     }
@@ -160,7 +165,8 @@ impl CadenceCheck {
         let heard = Heard {
             incarnation,
             at_ms: arrived_ms,
-            interval_ms: ms_of(interval, self.period_ms),
+            // While this one was on its way the author may have announced a shorter one.
+            interval_ms: ms_of(interval, self.period_ms).min(self.latest_ms(author)),
         };
         self.heard.insert((author, by), heard);
     }
@@ -328,6 +334,19 @@ mod tests {
             c.on_boot(10_000, 1);
             c.on_transmission(10_000 + at_ms, 1, &Handicaps::default(), &mut found);
             assert_eq!(found.counts.contains_key("probation"), broken, "{at_ms}");
+        }
+    }
+
+    /// A heartbeat was on its way when its author announced that it speaks more often.
+    #[test]
+    fn a_shorter_interval_counts_from_when_it_is_announced() {
+        for (announced, broken) in [(4, false), (5, true)] {
+            let (mut c, mut found) = check();
+            c.on_beacon_spoken(2, announced);
+            c.on_heartbeat_heard(50_000, 1, (2, 4), 5);
+            let (down, healthy) = ((4, Status::Down), Handicaps::default());
+            c.on_belief(59_000, (1, 2), down, (1, &healthy), &mut found);
+            assert_eq!(found.counts.contains_key("haste"), broken, "{announced}");
         }
     }
 
