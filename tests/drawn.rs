@@ -17,7 +17,7 @@ fn missions_that_nobody_thought_of_hold() {
         let run = storm(&prepared, 1, free_ms, Wanted::default());
         flown += 1;
         if !run.report.passed {
-            let broken: Vec<_> = run.violations().into_iter().take(3).collect();
+            let broken: Vec<_> = run.violations().iter().take(3).collect();
             failed.push(format!("{seed}: {:?} {broken:?}", run.report.reasons));
         }
     }
