@@ -14,9 +14,6 @@ use std::collections::BTreeMap;
 /// period. In quarters of an interval.
 const CLAIM_QUARTERS: u64 = 4 * 10 + 1 + 1;
 
-/// A peer looks at the time so often in a period.
-const LOOKS_A_PERIOD: u64 = 4;
-
 /// Clocks count whole milliseconds, and a timer is set a few times in a duration.
 const ROUNDING_MS: u64 = 5;
 
@@ -217,9 +214,8 @@ impl CadenceCheck {
         };
         let patience_ms = quarters * heard.interval_ms / 4;
         let passed_on_ms = handicaps.grown_ms(patience_ms, heard.at_ms, now_ms) - patience_ms;
-        let look_ms = self.period_ms / LOOKS_A_PERIOD;
-        let (heard_ms, now) = (heard.at_ms, now_ms);
-        let jumped_ms = handicaps.taken_for_listening_ms(observer, heard_ms, now, look_ms);
+        let since = (heard.at_ms, now_ms);
+        let jumped_ms = handicaps.taken_for_listening_ms(observer, since, self.period_ms);
         let slack_ms = 100 * (diameter + 1) + passed_on_ms + jumped_ms;
         let silent_ms = handicaps.lived_ms(observer, heard.at_ms, now_ms);
         if silent_ms + slack_ms < patience_ms {
@@ -376,18 +372,22 @@ mod tests {
 
     #[test]
     fn a_jump_of_the_clock_counts_as_silence_up_to_one_look_at_the_time() {
-        for (after_ms, broken) in [(3_700, true), (3_850, false)] {
+        // A jump by less than half a period and a look is noticed by nobody.
+        for (peer, ahead_ms, after_ms, broken) in [
+            (1, 20_000, 3_700, true),
+            (1, 20_000, 3_850, false),
+            (1, 740, 3_350, false),
+            (1, 760, 3_350, true),
+            (3, 740, 3_350, false),
+        ] {
             let (mut c, mut found) = check();
             let mut jumps = Handicaps::default();
             c.on_beacon_heard((50_000, 50_000), (1, 1, 1), (2, 4), &beacon(None));
-            let jump = Fault::ClockJump {
-                peer: 1,
-                ahead_ms: 20_000,
-            };
-            jumps.on_fault(52_000, &jump);
+            jumps.on_fault(52_000, &Fault::ClockJump { peer, ahead_ms });
             let suspects = (4, Status::Suspect);
             c.on_belief(50_000 + after_ms, (1, 2), suspects, (1, &jumps), &mut found);
-            assert_eq!(found.counts.contains_key("haste"), broken, "{after_ms}");
+            let is_found = found.counts.contains_key("haste");
+            assert_eq!(is_found, broken, "{peer} {ahead_ms} {after_ms}");
         }
     }
 

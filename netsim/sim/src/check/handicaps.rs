@@ -14,6 +14,9 @@
 use crate::fault::Fault;
 use std::collections::BTreeMap;
 
+/// A peer looks at the time so many times a period.
+const LOOKS_A_PERIOD: u64 = 4;
+
 /// Promises of as many kinds may be under way on one disk, one each: a life, a bid, a
 /// section, covered cells.
 const WRITES_UNDER_WAY: u64 = 4;
@@ -111,12 +114,27 @@ impl Handicaps {
     }
 
     /// How much of the jumps of its clock a peer may take for time in which it listened, when
-    /// it looks at the time this often: one that comes just after a look is late only from the
-    /// next on.
+    /// it looks at the time four times a period: one that comes just after a look is late only
+    /// from the next on, and late is who is so by more than half a period. So does another, who
+    /// tells it for how long somebody is suspected.
     #[must_use]
-    pub fn taken_for_listening_ms(&self, id: u16, from_ms: u64, to_ms: u64, look_ms: u64) -> u64 {
-        let jumps = self.jumps_ms(id, from_ms, to_ms);
-        jumps.map(|jump_ms| jump_ms.min(look_ms)).sum()
+    pub fn taken_for_listening_ms(
+        &self,
+        id: u16,
+        (from_ms, to_ms): (u64, u64),
+        period_ms: u64,
+    ) -> u64 {
+        let (look_ms, late_ms) = (period_ms / LOOKS_A_PERIOD, period_ms / 2);
+        let taken = |jump_ms: u64| {
+            if jump_ms <= late_ms + look_ms {
+                jump_ms
+            } else {
+                look_ms
+            }
+        };
+        let of = |id: u16| -> u64 { self.jumps_ms(id, from_ms, to_ms).map(taken).sum() };
+        let others = self.peers.keys().filter(|other| **other != id);
+        of(id) + others.map(|other| of(*other)).max().unwrap_or(0)
     }
 
     fn jumps_ms(&self, id: u16, from_ms: u64, to_ms: u64) -> impl Iterator<Item = u64> + '_ {
