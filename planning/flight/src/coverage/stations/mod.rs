@@ -10,11 +10,13 @@
 //! | `bundle` | which pieces of lines one frame holds together |
 //! | `order` | in which order the pieces are flown |
 //! | `stand` | where a UAV may be when it sees a piece |
+//! | `parts` | which places zones part from where all take off |
 //! | `chain` | which of these places are joined, and how |
 
 mod bundle;
 mod chain;
 mod order;
+mod parts;
 mod stand;
 pub mod targets;
 #[cfg(test)]
@@ -27,6 +29,7 @@ use super::ring::{
 };
 use crate::route::{RouteLimits, Router};
 use chain::Chain;
+use parts::Parts;
 use skein_geometry::Curve;
 use skein_geometry::frame::{MAX_MISSION_RADIUS_M, Point, Pose};
 use std::sync::Arc;
@@ -42,6 +45,9 @@ pub struct StationsProblem<'a> {
     /// The order in which they are flown: each number once.
     pub order: Vec<usize>,
 }
+
+/// Why a station is not flown that zones part from the launch point.
+const PARTED: &str = "no-fly zones part it from the launch point";
 
 /// Most stations of a loop: cells are numbered by `u16`.
 const MAX_STATIONS: usize = 65_535;
@@ -68,8 +74,14 @@ pub fn build(problem: &StationsProblem<'_>) -> Result<CoverageLoop, LoopError> {
     let router = Router::new(Arc::clone(&flown.zones), limits);
     let mut uncoverable = Vec::new();
     let mut stands = Vec::with_capacity(problem.order.len());
+    let parts = Parts::of(flown);
     for &n in &problem.order {
-        match stand::stands(problem, n) {
+        let poses = stand::stands(problem, n).and_then(|mut poses| {
+            poses.retain(|pose| !parts.is_parted(pose.position()));
+            let is_reached = !poses.is_empty();
+            is_reached.then_some(poses).ok_or(PARTED)
+        });
+        match poses {
             Ok(poses) => stands.push((n, poses)),
             Err(why) => uncoverable.push((name(n), why.to_owned())),
         }

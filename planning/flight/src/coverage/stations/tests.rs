@@ -130,7 +130,7 @@ fn what_cannot_be_seen_is_listed_with_the_reason() {
         why,
         [
             (2, "inside a no-fly zone"),
-            (3, "no flyable curve links it with the others")
+            (3, "no-fly zones part it from the launch point")
         ]
     );
     // A way into a dead end costs the pieces in it, not those after it.
@@ -142,6 +142,39 @@ fn what_cannot_be_seen_is_listed_with_the_reason() {
         build(&StationsProblem::of_targets(&self::flown(vec![]), &large)).unwrap_err(),
         LoopError::Nothing
     );
+}
+
+/// Three of four points lie in a yard that is shut: the others are flown as if they were alone.
+#[test]
+fn what_is_in_a_shut_yard_keeps_nothing_else_from_the_loop() {
+    let walls = vec![
+        rectangle(500.0, -20.0, 1_500.0, 0.0),
+        rectangle(500.0, 1_000.0, 1_500.0, 1_020.0),
+        rectangle(500.0, 0.0, 520.0, 1_000.0),
+        rectangle(1_480.0, 0.0, 1_500.0, 1_000.0),
+    ];
+    let grid = |x0: f64, y0: f64, columns: usize, rows: usize, step_m: f64| {
+        let at = move |i: usize| (i / rows, i % rows);
+        let places = (0..columns * rows).map(at);
+        places.map(move |(c, r)| (x0 + step_m * c as f64, y0 + step_m * r as f64))
+    };
+    let outside: Vec<_> = grid(-500.0, 100.0, 3, 4, 230.0).collect();
+    let inside = grid(700.0, 200.0, 6, 6, 110.0);
+    // They come in turns, so that each is next to one behind a wall.
+    let mut all: Vec<(f64, f64)> = inside.collect();
+    for (i, p) in outside.iter().enumerate() {
+        all.insert(4 * i, *p);
+    }
+    let flown = flown(walls);
+    let (all, alone) = (points(&all), points(&outside));
+    let problem = StationsProblem::of_targets(&flown, &all);
+    let with_yard = build(&problem).unwrap();
+    judge(&problem, &with_yard);
+    let alone = build(&StationsProblem::of_targets(&flown, &alone)).unwrap();
+    assert_eq!(with_yard.len(), outside.len());
+    assert_eq!(with_yard.uncoverable().len(), 36);
+    let length_m = |l: &CoverageLoop| l.cells().iter().map(|c| c.curve.length_m()).sum::<f64>();
+    assert!(length_m(&with_yard) < 1.15 * length_m(&alone));
 }
 
 #[test]
