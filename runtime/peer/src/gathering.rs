@@ -63,7 +63,7 @@ const AGAIN: u64 = 4;
 const RANK_INTERVALS: u64 = 4;
 
 /// That a sector became too dense, or eased, is told so often, so many beacon intervals apart.
-const URGENT_TIMES: u8 = 2;
+const URGENT_TIMES: u8 = 3;
 const URGENT_INTERVALS: u64 = 2;
 
 /// At the end everything is told that is so much newer than what is known, milliseconds.

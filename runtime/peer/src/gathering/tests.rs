@@ -172,6 +172,20 @@ fn what_became_too_dense_is_told_at_once_and_people_are_told_once() {
     assert!(!heard.is_empty() && heard.iter().all(|a| !a.is_dense));
 }
 
+/// Nobody repairs what is lost, so what is urgent is said three times.
+#[test]
+fn what_became_too_dense_is_told_three_times_two_intervals_apart() {
+    let mut scene = Scene::new(7);
+    scene.look(400);
+    let since_s = scene.now_s;
+    let mut told_s = Vec::new();
+    for _ in 0..30 {
+        told_s.extend(scene.tell().iter().map(|_| scene.now_s - since_s));
+        scene.now_s += 1;
+    }
+    assert_eq!(told_s, [0, 2, 4]);
+}
+
 #[test]
 fn what_is_no_news_waits_and_is_told_again_by_whoever_knows_it() {
     let mut scene = Scene::new(7);
