@@ -18,7 +18,7 @@
 //! | trail | while its UAV flies along a contour: a stretch when it is full; every 8 I the one that grows, and the next of the older ones |
 //! | count | once its site is out of the picture, and every 10 I while it is in it: two at most at a look |
 //! | usage | what grew of streets, once its interval of the day is over, and every 40 I before that, of turns every 80 I: one at most every I; each of these for each eight UAVs that are believed alive, begun ones too |
-//! | crowd | when a sector became too dense or eased, within I, and again 2 I later; what else its looks say that nobody told for as long as the mission says, four times that where nobody is, half of it where that changed for certain, and what nobody told as fully for four times that: every 2 I for each UAV that is believed alive |
+//! | crowd | when a sector became too dense or eased, within I, and twice more, 2 I apart; what else its looks say that nobody told for as long as the mission says, four times that where nobody is, half of it where that changed for certain, and what nobody told as fully for four times that: every 2 I for each UAV that is believed alive |
 //!
 //! I is the interval that this peer's beacons announce, a period T where there is room.
 
