@@ -1,7 +1,7 @@
-//! Replays the seeds that once failed (`tests/seeds/*.txt`: scenario or `drawn:NUMBER`, seed, `storm` if its
-//! faults are drawn, where the UAVs begin, `own` for where the scenario says, and `uavs=2` for
-//! another number of them, one a line). Each must complete and break no rule, and the first must
-//! give the same history twice.
+//! Replays the seeds that once failed (`tests/seeds/*.txt`: scenario or `drawn:NUMBER`, seed,
+//! `storm` if its faults are drawn, where the UAVs begin, `own` for where the scenario says, and
+//! `uavs=2` for another number of them, one a line). Each must complete and break no rule, and the
+//! first must give the same history twice.
 
 use skein_netsim::Prepared;
 use skein_netsim::runs::{self, Wanted};
