@@ -12,7 +12,7 @@
 //! checked against those alone, and for nothing where there are none.
 
 use super::air::{self, Air};
-use super::follow::{HORIZON_S, Offset, Track};
+use super::follow::{HORIZON_S, Offset, Track, fly};
 use crate::percept::Percept;
 use crate::setpoint::{MAX_STEPS, Setpoint, Side, Steer};
 use skein_flight::airframe::Airframe;
@@ -30,6 +30,7 @@ const GATHER_M: f64 = 60.0;
 /// How far ahead the failsafe loiter may begin, seconds: the time without setpoints
 /// after which an airframe flies it.
 const FAILSAFE_S: f64 = 1.0;
+const FAILSAFE_MS: u32 = 1_000;
 
 /// Trochoids are measured by chords of this duration, seconds: at a turn of 0.6 g they
 /// stray a few centimetres.
@@ -149,7 +150,8 @@ impl Envelope {
             let middle = self.middle(pose, side, radius_m);
             self.near.distance_m(middle) >= radius_m + by_m
         };
-        let then = flown(pose, setpoint, wind, FAILSAFE_S);
+        let then = fly(*pose, v, &setpoint.steps, FAILSAFE_MS);
+        let then = drifted(then, wind * FAILSAFE_S);
         let sides = match self.side {
             Side::Left => [Side::Left, Side::Right],
             Side::Right => [Side::Right, Side::Left],
@@ -395,25 +397,6 @@ fn wind_of(percept: &Percept) -> Vector {
     }
 }
 
-/// Where a commanded flight is after some seconds.
-fn flown(pose: &Pose, setpoint: &Setpoint, wind: Vector, for_s: f64) -> Pose {
-    let v = setpoint.airspeed_mps;
-    let (mut at, mut left_s) = (*pose, for_s);
-    for (i, s) in setpoint.steps.iter().enumerate() {
-        let last = i + 1 == setpoint.steps.len();
-        let lasts_s = f64::from(s.duration_ms) / 1000.0;
-        let part_s = if last { left_s } else { left_s.min(lasts_s) };
-        let piece = Segment {
-            start: at,
-            curvature_per_m: s.turn_rate_radps / v,
-            length_m: v * part_s,
-        };
-        at = drifted(piece.end(), wind * part_s);
-        left_s -= part_s;
-    }
-    at
-}
-
 fn drifted(pose: Pose, by: Vector) -> Pose {
     Pose::new(pose.position() + by, pose.heading_rad)
 }
@@ -579,7 +562,7 @@ mod tests {
         for i in 0..400 {
             let out = e.check(&percept_at(pose, i * 200), straight(13.0));
             held += u32::from(out.steps[0].turn_rate_radps.abs() > 0.1);
-            pose = crate::reactive::follow::fly(pose, out.airspeed_mps, &out.steps, 200);
+            pose = fly(pose, out.airspeed_mps, &out.steps, 200);
             let away_m = zones.iter().map(|z| z.distance_m(pose.position()));
             nearest_m = away_m.fold(nearest_m, f64::min);
         }
@@ -615,7 +598,7 @@ mod tests {
             } else if held > 0 {
                 break;
             }
-            pose = crate::reactive::follow::fly(pose, out.airspeed_mps, &out.steps, 200);
+            pose = fly(pose, out.airspeed_mps, &out.steps, 200);
             pose = drifted(pose, wind * 0.2);
             least_m = least_m.min(zone.distance_m(pose.position()));
         }

@@ -17,7 +17,7 @@ use skein_geometry::math::{PI, TAU, sin_cos};
 use skein_geometry::random::{SplitMix64, mix};
 
 /// So often something is mended before a draw is given up.
-const TRIES: u32 = 60;
+const TRIES: usize = 60;
 
 /// Gravity, m/s², for the radius of a turn.
 const GRAVITY_MPS2: f64 = 9.81;
@@ -41,14 +41,15 @@ pub fn drawn(seed: u64) -> Result<Drawn, ScenarioError> {
     let mut random = Random(SplitMix64::new(mix(seed ^ 0xD0A3_0000)));
     let mut parts = Parts::new(seed, &mut random);
     let mut refused = Vec::new();
-    for _ in 0..TRIES {
+    let name = format!("drawn-{seed}.json5");
+    loop {
         let text = parts.text();
-        let name = format!("drawn-{seed}.json5");
+        let may_mend = refused.len() < TRIES;
         match parse_with(&name, &text, &files(), &Overrides::default()) {
             Ok(scenario) => {
                 // Those who are left after a storm are to have the fuel for all of it.
                 let scarce = scenario.findings.iter().find(|f| f.field == "airframes");
-                let Some(scarce) = scarce else {
+                let Some(scarce) = scarce.filter(|_| may_mend) else {
                     return Ok(Drawn {
                         text,
                         scenario,
@@ -58,19 +59,13 @@ pub fn drawn(seed: u64) -> Result<Drawn, ScenarioError> {
                 refused.push(scarce.to_string());
                 parts.mend("airframes", &scarce.problem, &mut random);
             }
-            Err(ScenarioError::Invalid(e)) => {
+            Err(ScenarioError::Invalid(e)) if may_mend => {
                 refused.push(e.to_string());
                 parts.mend(&e.field, &e.problem, &mut random);
             }
             Err(e) => return Err(e),
         }
     }
-    let name = format!("drawn-{seed}.json5");
-    parse_with(&name, &parts.text(), &files(), &Overrides::default()).map(|scenario| Drawn {
-        text: parts.text(),
-        scenario,
-        refused,
-    })
 }
 
 struct Random(SplitMix64);

@@ -278,18 +278,12 @@ fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut
 
 /// Where the base is moved while it is flown nobody can come home to within the clearance.
 fn moved_bases(spec: &Spec, geometry: &MissionGeometry, out: &mut Vec<Finding>) {
-    let clearance_m = spec.mission.clearance_m();
     for f in &spec.faults {
         let Fault::Rebase { east_mm, north_mm } = f.fault else {
             continue;
         };
-        let base = point_m((east_mm, north_mm));
-        let base_m = geometry.router.zones().distance_m(base);
-        if base_m < clearance_m {
-            let text = format!(
-                "the base that is given at {} s is {base_m:.1} m from a no-fly zone; expected at least the clearance of {clearance_m:.1} m",
-                f.at_ms / 1000
-            );
+        if let Err(why) = geometry.may_be_base(point_m((east_mm, north_mm))) {
+            let text = format!("the mission that is given at {} s: {why}", f.at_ms / 1000);
             out.push(Finding::new(Severity::Error, "faults", text));
         }
     }

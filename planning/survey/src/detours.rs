@@ -9,9 +9,6 @@ use skein_geometry::frame::Point;
 use skein_geometry::offset::{Grown, Growth, OffsetError, Region, Zone, grow};
 use thiserror::Error;
 
-/// How far beyond all zones and places the mesh ends, metres: there is room to pass.
-const OUTSKIRTS_M: f64 = 1_000.0;
-
 /// Why there are no ways round the zones. Nothing was planned.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum DetourError {
@@ -44,13 +41,7 @@ impl Detours {
         if rings.is_empty() {
             return Ok(Self { grown, mesh: None });
         }
-        let far = |p: &Point| p.coords.amax();
-        let inside = rings.iter().flat_map(|r| r.iter()).chain(places);
-        let half_m = inside.map(far).fold(0.0, f64::max) + OUTSKIRTS_M;
-        let border = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-            .map(|(x, y)| Point::new(x * half_m, y * half_m));
-        let all: Vec<&[Point]> = std::iter::once(border.as_slice()).chain(rings).collect();
-        let mesh = Mesh::from_rings(&all).map_err(DetourError::Mesh)?;
+        let mesh = Mesh::around(&rings, places).map_err(DetourError::Mesh)?;
         Ok(Self {
             grown,
             mesh: Some(mesh),

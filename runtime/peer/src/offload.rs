@@ -10,6 +10,7 @@ use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_flight::coverage::ring::division::{RouteNetwork, divide};
 use skein_flight::route::Router;
 use skein_flight::tracking::buildings::Town;
+use skein_geometry::frame::Point;
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
@@ -48,8 +49,16 @@ impl MissionGeometry {
     /// # Errors
     /// A sentence that says how near a no-fly zone is.
     pub fn base_is_clear(&self) -> Result<(), String> {
+        self.may_be_base(self.mission.base_m())
+    }
+
+    /// Whether UAVs may loiter above a place, were it the base.
+    ///
+    /// # Errors
+    /// A sentence that says how near a no-fly zone is.
+    pub fn may_be_base(&self, place: Point) -> Result<(), String> {
         let clearance_m = self.mission.clearance_m();
-        let base_m = self.router.zones().distance_m(self.mission.base_m());
+        let base_m = self.router.zones().distance_m(place);
         if base_m < clearance_m {
             return Err(format!(
                 "its base is {base_m:.1} m from a no-fly zone; expected at least the clearance of {clearance_m:.1} m"

@@ -134,11 +134,6 @@ impl CadenceCheck {
         self.slowest.insert(id, self.interval_ms(id));
     }
 
-    /// What its author announced last, as far as is known.
-    fn latest_ms(&self, id: u16) -> u64 {
-        self.announced.get(&id).copied().unwrap_or(u64::MAX)
-    }
-
     fn interval_ms(&self, id: u16) -> u64 {
         self.announced.get(&id).copied().unwrap_or(self.period_ms)
     }
@@ -159,11 +154,13 @@ impl CadenceCheck {
         }
         let life = self.lives.entry(author).or_default();
         *life = incarnation.max(*life);
+        let said_ms = ms_of(interval, self.period_ms);
+        // While this one was on its way the author may have announced a shorter one.
+        let latest_ms = self.announced.get(&author).copied();
         let heard = Heard {
             incarnation,
             at_ms: arrived_ms,
-            // While this one was on its way the author may have announced a shorter one.
-            interval_ms: ms_of(interval, self.period_ms).min(self.latest_ms(author)),
+            interval_ms: latest_ms.map_or(said_ms, |ms| ms.min(said_ms)),
         };
         self.heard.insert((author, by), heard);
     }

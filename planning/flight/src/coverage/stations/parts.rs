@@ -6,9 +6,6 @@ use crate::route::mesh::Mesh;
 use skein_geometry::frame::Point;
 use skein_geometry::offset::{Growth, Region, Zone, grow};
 
-/// The free plane ends so far beyond everything, metres.
-const OUTSKIRTS_M: f64 = 1_000.0;
-
 /// Zones are grown by this share of the clearance: outlines overshoot by half a percent, and what
 /// is parted by them is surely parted by the clearance.
 const SHARE: f64 = 0.99;
@@ -45,13 +42,7 @@ fn free_plane(problem: &LoopProblem) -> Option<(Mesh, u32)> {
     if rings.is_empty() {
         return None;
     }
-    let corners = rings.iter().flat_map(|ring| ring.iter());
-    let far_m = corners.chain([&problem.launch]).map(|p| p.coords.amax());
-    let half_m = far_m.fold(0.0, f64::max) + OUTSKIRTS_M;
-    let border = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-        .map(|(x, y)| Point::new(x * half_m, y * half_m));
-    let all: Vec<&[Point]> = core::iter::once(border.as_slice()).chain(rings).collect();
-    let mesh = Mesh::from_rings(&all).ok()?;
+    let mesh = Mesh::around(&rings, &[problem.launch]).ok()?;
     let launch = u32::try_from(mesh.locate(problem.launch)?).ok()?;
     Some((mesh, launch))
 }

@@ -11,6 +11,9 @@ use skein_geometry::frame::Point;
 /// Coordinates below this are zero: the triangulation squares them without underflow.
 const SMALLEST_M: f64 = 1e-30;
 
+/// The plane around rings ends so far beyond everything, metres.
+const OUTSKIRTS_M: f64 = 1_000.0;
+
 impl Mesh {
     /// What lies inside an odd number of rings; each ring may run either way.
     ///
@@ -35,6 +38,20 @@ impl Mesh {
         }
         let (points, edges, starts) = cells_between(&points, &lines)?;
         Self::finish(&points, edges, starts)
+    }
+
+    /// The plane around the outlines of zones, to a kilometre beyond all of them and some places.
+    ///
+    /// # Errors
+    /// As [`Mesh::from_rings`].
+    pub fn around(rings: &[&[Point]], places: &[Point]) -> Result<Self, MeshError> {
+        let inside = rings.iter().flat_map(|ring| ring.iter()).chain(places);
+        let far_m = inside.map(|p| p.coords.amax()).fold(0.0, f64::max);
+        let half_m = far_m + OUTSKIRTS_M;
+        let border = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+            .map(|(x, y)| Point::new(x * half_m, y * half_m));
+        let border = core::iter::once(border.as_slice());
+        Self::from_rings(&border.chain(rings.iter().copied()).collect::<Vec<_>>())
     }
 }
 
