@@ -2,7 +2,7 @@
 //!
 //! | record | when |
 //! |---|---|
-//! | beacon | every I, ±10 %; within I/8 when somebody is heard who was suspected, or is suspected by a neighbour and was heard since, at most every I/2 and if nothing is owed |
+//! | beacon | every I, ±10 %; within I/8 when somebody is heard who was suspected, or is suspected by a neighbour and was heard since, at most every I/2, if nothing is owed and no own bid or claim has waited for I |
 //! | heartbeat | half-way between two beacons; at once, and four times in I, when this peer hears that it is suspected; with heartbeats of others that are asked for at once or answer that |
 //! | claim | at once when a section was adopted, within I when cells were taken or it shrank by a rule; every 10 I for its ETA, for each eight that are known to live |
 //! | cover | own or heard coverage is news, at most every 2 I; at most every I when a neighbour's beacon shows other coverage. What is news is said twice; all of it every 4 I where a neighbour still knows other cells, at the end, and to who was not there lately |

@@ -681,7 +681,7 @@ impl Peer {
         if !self.speaks() {
             return;
         }
-        if !self.relay.air.may_answer(self.now) {
+        if !self.relay.may_answer(self.now) {
             let later = self.now.plus_ms(self.relay.air.interval_ms() / 8);
             self.timers.set(Timer::Question, later);
             return;
@@ -848,7 +848,7 @@ impl Peer {
 
     /// Reports what changed in the beliefs about others.
     fn report_changes(&mut self, changes: Vec<Change>) {
-        if self.membership.take_refuted() && self.speaks() && self.relay.air.is_in_credit() {
+        if self.membership.take_refuted() && self.speaks() && self.relay.may_hasten(self.now) {
             self.outbound
                 .hasten(self.now, &mut self.timers, &mut self.rng);
         }

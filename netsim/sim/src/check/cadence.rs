@@ -214,7 +214,10 @@ impl CadenceCheck {
         let since = (heard.at_ms, now_ms);
         let jumped_ms = handicaps.taken_for_listening_ms(observer, since, self.period_ms);
         let slack_ms = 100 * (diameter + 1) + passed_on_ms + jumped_ms;
-        let silent_ms = handicaps.lived_ms(observer, heard.at_ms, now_ms);
+        // What others measured they measured by clocks that are as fast as the slack allows, but
+        // this one's slowness is not theirs.
+        let lived_ms = handicaps.lived_ms(observer, heard.at_ms, now_ms);
+        let silent_ms = lived_ms.max(now_ms.saturating_sub(heard.at_ms));
         if silent_ms + slack_ms < patience_ms {
             found.broken("haste", now_ms, Some(observer), || {
                 format!(
@@ -385,6 +388,23 @@ mod tests {
             c.on_belief(50_000 + after_ms, (1, 2), suspects, (1, &jumps), &mut found);
             let is_found = found.counts.contains_key("haste");
             assert_eq!(is_found, broken, "{peer} {ahead_ms} {after_ms}");
+        }
+    }
+
+    /// Who gives somebody up may have been told by one whose clock is fast; that its own is slow
+    /// takes nothing from that.
+    #[test]
+    fn a_slow_clock_believes_what_a_fast_one_measured() {
+        for (after_ms, broken) in [(8_360, true), (8_390, false)] {
+            let (mut c, mut found) = check();
+            let mut drifts = Handicaps::default();
+            for (peer, ppm) in [(1, -20_000), (3, 20_000)] {
+                drifts.on_fault(10_000, &Fault::ClockDrift { peer, ppm });
+            }
+            c.on_beacon_heard((50_000, 50_000), (1, 1, 1), (2, 4), &beacon(None));
+            let down = (4, Status::Down);
+            c.on_belief(50_000 + after_ms, (1, 2), down, (1, &drifts), &mut found);
+            assert_eq!(found.counts.contains_key("haste"), broken, "{after_ms}");
         }
     }
 

@@ -431,7 +431,7 @@ impl Swarm {
             if self.peers[idx].slow_ms == 0 {
                 self.hear_late(idx, arrived_ms, &input);
             }
-            self.feed(idx, input);
+            self.feed_arrived(idx, arrived_ms, input);
         }
         self.feed(idx, Input::Timer);
     }

@@ -613,18 +613,22 @@ impl Swarm {
 
     /// Gives one input to a peer, now or when its process gets round to it.
     fn feed(&mut self, idx: usize, input: Input) {
-        let now_ms = self.now_ms;
+        self.feed_arrived(idx, self.now_ms, input);
+    }
+
+    /// The same of an input that arrived then.
+    fn feed_arrived(&mut self, idx: usize, arrived_ms: u64, input: Input) {
         let s = &mut self.peers[idx];
         match s.process {
             Process::Stopped => {}
-            Process::Paused => s.wait(now_ms, input),
+            Process::Paused => s.wait(arrived_ms, input),
             Process::Running if s.slow_ms > 0 => {
                 if s.inbox.is_empty() {
-                    let (boot, at_ms) = (s.boots, now_ms + s.slow_ms);
+                    let (boot, at_ms) = (s.boots, self.now_ms + s.slow_ms);
                     self.queue
                         .push(at_ms, Phase::Decide, Event::CatchUp { idx, boot });
                 }
-                self.peers[idx].wait(now_ms, input);
+                self.peers[idx].wait(arrived_ms, input);
             }
             Process::Running => self.handle(idx, input),
         }

@@ -8,6 +8,7 @@
 //! | another follows in the same instant | it shares the headers of the first while one transmission holds both |
 //! | a beacon or a heartbeat is sent | it is paid for, if need be later: what is owed makes everything else wait |
 //! | a suspicion is answered, or something is asked for at once | it is paid from a reserve, and from the share when the reserve is empty |
+//! | an own bid or claim that was not said yet has waited for I | the share is saved for it: no beacon is said early, and what is asked for at once, or answers that, is paid from the reserve alone |
 //! | pieces of a newer mission are lacking, and a neighbour follows it | a tenth of the share is lent to it, or in even parts to those who do |
 //! | a piece of a mission is sent that neighbours lack | it is paid from what they lend, or from the share |
 //! | a beacon is due | its interval is the shortest in which three fifths of the share carry it and a heartbeat, 16 T at most |
@@ -408,11 +409,12 @@ impl Airtime {
         self.tokens_millibytes = self.tokens_millibytes.saturating_sub(cost - reserved);
     }
 
-    /// Whether an answer to a suspicion could be paid from the reserve or the share.
-    pub fn may_answer(&mut self, now: Time) -> bool {
+    /// Whether an answer to a suspicion could be paid from the reserve, or from the share where
+    /// nothing else is saved for.
+    pub fn may_answer(&mut self, now: Time, saves: bool) -> bool {
         self.refill(now);
         self.reserve_millibytes >= millibytes(2 * (HEARTBEAT_BYTES + OVERHEAD_BYTES))
-            || self.tokens_millibytes >= 0
+            || (self.tokens_millibytes >= 0 && !saves)
     }
 
     /// Pays for a record if it may go now.

@@ -545,14 +545,18 @@ impl Relay {
         let due = self.due(&key, from, row.priority);
         let lasts_from = if is_piece(&key) { due } else { from };
         let until = lasts_from.plus_ms(u64::from(self.lifetime_ms(kind)));
+        let standing = self.standing(&key, row.priority);
+        // A later version has waited as long as the one that it replaces.
+        let before = self.queue.first_due(&key);
+        let before = before.filter(|_| standing == Standing::First);
         self.queue.insert(
             key,
             Waiting {
                 from,
                 until,
-                due,
+                due: before.map_or(due, |before| before.min(due)),
                 priority: row.priority,
-                standing: self.standing(&key, row.priority),
+                standing,
             },
         );
     }
@@ -561,6 +565,26 @@ impl Relay {
     #[must_use]
     pub fn waits(&self, kind: Kind) -> bool {
         self.queue.contains(&(self.me, kind.number(), 0, 0))
+    }
+
+    /// Whether a beacon may be said sooner than it is due: nothing is owed, and nothing is saved
+    /// for.
+    #[must_use]
+    pub fn may_hasten(&self, now: Time) -> bool {
+        self.air.is_in_credit() && !self.saves(now)
+    }
+
+    /// Whether something may be asked for at once, or such a question answered.
+    pub fn may_answer(&mut self, now: Time) -> bool {
+        let saves = self.saves(now);
+        self.air.may_answer(now, saves)
+    }
+
+    /// Whether something that this peer alone can say has waited for an interval: the share is
+    /// saved for it. Where what is said early took each byte before it, a long claim would never
+    /// go.
+    fn saves(&self, now: Time) -> bool {
+        self.queue.waits_first(now, self.air.interval_ms())
     }
 
     /// How long a record of this kind is worth sending, milliseconds.

@@ -194,6 +194,9 @@ struct Reuse {
 /// intervals: each neighbour has told of it by then, and it has not flown far.
 const NEAR_INTERVALS: u64 = 4;
 
+/// Hops of somebody who is not heard itself, and of whom nothing more is known.
+const FAR_HOPS: u8 = 2;
+
 /// News is told so often: one beacon may be lost, two hardly are.
 const NEWS_TOLD: u8 = 2;
 
@@ -387,6 +390,7 @@ impl Known {
             until: now,
             is_met: false,
         });
+        self.hops = NO_HOPS;
     }
 
     /// Whether it was held for down, and is there again of late.
@@ -508,9 +512,26 @@ impl Known {
     /// The heartbeat known came once more, by no more hops than those of late. By more only
     /// what is fresher counts: who is gone would be farther with each echo.
     fn note_as_near(&mut self, now: Time, heard: &HeardHeartbeat, interval_ms: u64) {
-        if heard.hops <= self.distance(now, interval_ms) {
+        if heard.hops > self.distance(now, interval_ms) {
+            return;
+        }
+        if self.is_heard_once() {
+            let (_, fewest) = self.hops[self.latest];
+            self.hops[self.latest] = (now, heard.hops.min(fewest));
+        } else {
             self.note_hops(now, heard.hops, interval_ms);
         }
+    }
+
+    /// Whether one heartbeat of it was heard of since it is known, or there again.
+    fn is_heard_once(&self) -> bool {
+        self.nth_hops(1).1 == u8::MAX
+    }
+
+    /// The fewest hops in an interval, so many of those that are noted ago.
+    fn nth_hops(&self, ago: usize) -> (Time, u8) {
+        let all = self.hops.len();
+        self.hops[(self.latest + all - ago) % all]
     }
 
     /// The fewest hops by which it was heard of lately: the freshest heartbeat may have come
@@ -530,23 +551,38 @@ impl Known {
         if self.status == Status::Down {
             return Weight::default();
         }
-        let recent = self
-            .hops
-            .iter()
-            .filter(|(t, _)| now.since_ms(*t) < window_ms);
-        let fewest = recent.map(|(_, hops)| *hops).min().unwrap_or(u8::MAX);
+        let of_late = self.hearings();
+        let of_late = of_late.filter(|(until, _)| now.since_ms(*until) < window_ms);
+        let fewest = of_late.map(|(_, hops)| hops).min();
         let said = self.info.heard.is_some_and(|t| now.since_ms(t) < window_ms);
         Weight {
             interval: self.freshest.interval,
-            hops: if fewest < u8::MAX { fewest } else { 0 },
+            hops: fewest.unwrap_or(0),
             eccentricity: if said { self.eccentricity } else { 0 },
         }
     }
 
+    /// By how many hops it was heard of, and since when each counts. Each counts as long as the
+    /// one after it: the freshest may have come by a long way, and of somebody far it is often
+    /// the only one of late. What came alone says that it is farther than one hop at most.
+    fn hearings(&self) -> impl Iterator<Item = (Time, u8)> + '_ {
+        let most = if self.is_heard_once() {
+            FAR_HOPS
+        } else {
+            u8::MAX
+        };
+        let each = (0..self.hops.len()).map(|ago| {
+            let (since, _) = self.nth_hops(ago.saturating_sub(1));
+            (since, self.nth_hops(ago).1)
+        });
+        let each = each.filter(|(_, hops)| *hops < u8::MAX);
+        each.map(move |(since, hops)| (since, hops.min(most)))
+    }
+
     /// Since when it was last heard by so many hops at most.
     pub(super) fn last_within(&self, hops: u8) -> Time {
-        let within = self.hops.iter().filter(|(_, by)| *by <= hops);
-        within.map(|(since, _)| *since).max().unwrap_or_default()
+        let within = self.hearings().filter(|(_, by)| *by <= hops);
+        within.map(|(since, _)| since).max().unwrap_or_default()
     }
 
     pub(super) fn change(&self) -> Change {

@@ -190,7 +190,12 @@ fn heartbeats(
         .filter(|(id, _)| told.iter().all(|g| g.id != **id))
         .map(|(_, k)| k)
         .collect();
-    wanted.sort_by_cached_key(|k| (Reverse(k.want(now)), k.freshest.id));
+    // Of what was told once and may have been lost the heartbeat alone tells as much.
+    let is_old_news = |k: &Known| k.is_news(now) && !k.is_untold_news(now);
+    wanted.sort_by_cached_key(|k| {
+        let gain = (is_old_news(k), k.want(now));
+        (Reverse(gain), k.freshest.id)
+    });
     if asks && moment.is_far {
         let old_ms = moment.bound_ms / OLD;
         let again_ms = ASK_INTERVALS * moment.own_interval_ms;
@@ -205,6 +210,9 @@ fn heartbeats(
     wanted.sort_by_key(|k| k.freshest.id);
     let say = |known: &mut Known| {
         known.tell(now);
+        if is_old_news(known) {
+            known.tell_news(now, moment.own_interval_ms);
+        }
         known.fresh(now, moment.interval_ms)
     };
     wanted.into_iter().map(say).collect()

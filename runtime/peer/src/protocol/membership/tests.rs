@@ -927,12 +927,16 @@ fn the_diameter_is_the_largest_eccentricity_heard_of_in_ten_intervals() {
         ..entry(4, 7, 10, None)
     };
     m.on_beacon(Time(20_000), 3, 1, &beacon(1, vec![told]));
-    assert_eq!(
-        (m.diameter(Time(20_000)), m.eccentricity(Time(20_000))),
-        (6, 6)
-    );
+    let extent = |m: &Membership, at_ms| (m.diameter(Time(at_ms)), m.eccentricity(Time(at_ms)));
+    assert_eq!(extent(&m, 20_000), (2, 2), "heard once, by whatever way");
+    let later = Gossip {
+        heartbeat: 9,
+        ..told
+    };
+    m.on_beacon(Time(22_000), 3, 1, &beacon(3, vec![later]));
+    assert_eq!(extent(&m, 22_000), (6, 6));
     // Both patiences grow with it: k1 = 4 + 6/4, k2 = 4 + 6/2 of the longest interval.
-    let patience = m.patience(Time(20_000));
+    let patience = m.patience(Time(22_000));
     assert_eq!(patience.k1_ms(1_000), 5_500);
     assert_eq!(patience.bound_ms, 5_500 + 7_000 + 8_000);
     assert_eq!(patience.verdict_ms(1_000), 7_000);
@@ -1059,6 +1063,28 @@ fn who_suspects_fourteen() -> (Membership, Time) {
     panic!("it is suspected");
 }
 
+/// A beacon of four entries has room for one of news, whole, the first time; then the heartbeat
+/// alone tells it as well, before those of whom more is gained.
+#[test]
+fn news_is_told_a_second_time_by_the_heartbeat_alone() {
+    let mut m = among_nineteen();
+    let far = Gossip {
+        hops: 2,
+        ..entry(40, 5, 0, None)
+    };
+    m.on_beacon(Time(4_900), 3, 1, &beacon(11, vec![far]));
+    let (told, _) = m.tell(Time(5_000), 4, &BTreeSet::new());
+    assert!(told.iter().any(|g| g.id == 40), "{told:?}");
+    for id in 2..=20 {
+        m.on_heartbeat(Time(5_400), id, 1, (90, 4));
+    }
+    let (told, fresh) = m.tell(Time(6_000), 4, &BTreeSet::new());
+    assert!(told.iter().all(|g| g.id != 40), "{told:?}");
+    assert!(fresh.iter().any(|f| f.id == 40), "{fresh:?}");
+    let (told, fresh) = m.tell(Time(7_000), 4, &BTreeSet::new());
+    assert!(told.iter().all(|g| g.id != 40) && fresh.iter().all(|f| f.id != 40));
+}
+
 #[test]
 fn news_of_somebody_goes_first_in_two_beacons() {
     let (mut m, now) = who_suspects_fourteen();
@@ -1103,6 +1129,40 @@ fn a_suspicion_that_nobody_was_told_of_is_no_verdict() {
     assert!(at_last > bound_ms, "{at_last}");
 }
 
+/// Of somebody far often one heartbeat alone came of late, and by a long way: it is as far as
+/// that and the one before it say, but not once it was held for down in between.
+#[test]
+fn one_heartbeat_that_came_by_a_long_way_makes_nobody_far() {
+    let mut m = Membership::new(1, 1000);
+    let told = |heartbeat, hops| {
+        vec![Gossip {
+            heartbeat,
+            hops,
+            ..entry(4, 1, 0, None)
+        }]
+    };
+    let mut hear = |at_ms: u64, hops| {
+        let count = u32::try_from(at_ms / 1_000).unwrap();
+        m.on_beacon(Time(at_ms), 3, 1, &beacon(count, told(count, hops)));
+        for t in at_ms / 1_000..=(at_ms + 9_000) / 1_000 {
+            m.on_heartbeat(Time(t * 1_000), 3, 1, (u32::try_from(t).unwrap(), 4));
+        }
+        m.diameter(Time(at_ms + 9_000))
+    };
+    assert_eq!(hear(10_000, 2), 2);
+    assert_eq!(hear(25_000, 3), 3);
+    assert_eq!(hear(40_000, 12), 4, "three and one, as the one before");
+    assert_eq!(hear(55_000, 12), 13);
+    m.tick(Time(110_000));
+    assert_eq!(m.status(4).map(|(_, s)| s), Some(Status::Down));
+    let mut hear_again = |at_ms: u64| {
+        let count = u32::try_from(at_ms / 1_000).unwrap();
+        m.on_beacon(Time(at_ms), 3, 1, &beacon(count, told(count, 7)));
+        m.diameter(Time(at_ms))
+    };
+    assert_eq!((hear_again(111_000), hear_again(112_500)), (2, 8));
+}
+
 /// What is old is told, so that whoever knows a later one tells that.
 #[test]
 fn an_old_heartbeat_is_told_so_that_a_later_one_is_heard() {
@@ -1125,9 +1185,9 @@ fn an_old_heartbeat_is_told_so_that_a_later_one_is_heard() {
             asked.push(t);
         }
     }
-    // A quarter of the bound of 15.25 s is over at 6.3 s; then again after more than two
-    // intervals.
-    assert_eq!(asked, [7, 10]);
+    // It is told a second time as news. A quarter of the bound of 13.5 s is over at 5.9 s, and
+    // it asks after more than two intervals each.
+    assert_eq!(asked, [4, 7, 10]);
 }
 
 /// A peer that stood still when another had been silent for four periods: what arrived meanwhile

@@ -79,6 +79,20 @@ impl Queue {
         self.waiting.contains_key(key)
     }
 
+    /// Since when something waits that goes before what is due sooner.
+    pub(super) fn first_due(&self, key: &RecordKey) -> Option<Time> {
+        let waiting = self.waiting.get(key);
+        waiting
+            .filter(|w| w.standing == Standing::First)
+            .map(|w| w.due)
+    }
+
+    /// Whether such a thing has waited for so long.
+    pub(super) fn waits_first(&self, now: Time, ms: u64) -> bool {
+        let mut first = self.waiting.values();
+        first.any(|w| w.standing == Standing::First && w.due.plus_ms(ms) <= now)
+    }
+
     /// Makes room for one more, if need be in place of the least urgent.
     pub(super) fn make_room(&mut self, key: &RecordKey) {
         if self.len() >= MAX_QUEUE && !self.contains(key) {

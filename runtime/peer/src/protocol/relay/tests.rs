@@ -460,6 +460,53 @@ fn own_coverage_waits_for_own_bids_and_claims_and_not_for_their_repetition() {
     assert_eq!(sent[3..].iter().filter(|k| **k == kinds[0]).count(), 2);
 }
 
+/// In a crowd that suspects somebody all the time what is said early would take each byte before
+/// a long claim: once it has waited for an interval the share is saved for it, and a claim that
+/// changed meanwhile has waited as long as the one before.
+#[test]
+fn what_is_said_early_does_not_starve_an_own_claim() {
+    let mut r = relay(2);
+    share(&mut r, 5_000, 30);
+    for t in 0..20 {
+        r.air.plan_beacon(Time(5_000 + t));
+    }
+    let interval_ms = r.air.interval_ms();
+    // Nothing is owed, and a claim has to wait.
+    let spend = |r: &mut Relay, now: Time| {
+        while r.air.is_in_credit() {
+            r.air.charge(now, 50);
+        }
+        while r.air.may_answer(now, true) {
+            r.air.charge_answer(now, 60);
+        }
+        r.air.charge_answer(now, 20);
+        now.plus_ms(r.air.wait_ms(now, 0))
+    };
+    let claim = |r: &mut Relay, now: Time, seq: u32| {
+        let kind = Kind::Claim.number();
+        let record = Record {
+            kind,
+            ..record(2, seq)
+        };
+        r.own(now, &record, vec![0; 220]);
+    };
+    let begun = Time(6_000);
+    let mut now = spend(&mut r, begun);
+    claim(&mut r, begun, 1);
+    assert!(r.poll(now).is_none() && r.may_hasten(now) && r.may_answer(now));
+    now = spend(&mut r, begun.plus_ms(interval_ms - 1_500));
+    claim(&mut r, now, 2);
+    assert!(now < begun.plus_ms(interval_ms));
+    assert!(r.may_answer(now) && r.may_hasten(now));
+    now = spend(&mut r, begun.plus_ms(interval_ms));
+    assert!(r.poll(now).is_none() && r.air.is_in_credit());
+    assert!(!r.may_hasten(now) && !r.may_answer(now), "it is saved for");
+    let goes = now.plus_ms(r.air.wait_ms(now, 220));
+    assert!(r.poll(goes).is_some_and(|out| out.bytes.len() == 220));
+    now = spend(&mut r, goes);
+    assert!(r.may_answer(now) && r.may_hasten(now));
+}
+
 #[test]
 fn the_bucket_bounds_what_is_sent() {
     let mut r = relay(2);
