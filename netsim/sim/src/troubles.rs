@@ -130,7 +130,7 @@ pub const KINDS: &[Kind] = &[
 pub const RARE: &[Kind] = &[
     Kind {
         name: "crowd",
-        can: |s| s.storm.troubles.max_crowd > s.storm.troubles.max_uavs,
+        can: can_be_a_crowd,
         how: How::Scenario(crowd),
     },
     Kind::new("mission", can_be_given, missions),
@@ -716,6 +716,13 @@ fn fleet(s: &mut Stream, spec: &mut Spec, makespan_ms: u64) {
     resize(spec, usize::try_from(n).unwrap_or(there));
 }
 
+/// Whether a crowd is more than the scenario has itself: a fifth of a hundred UAVs that fly all
+/// that the hundred were to is none.
+fn can_be_a_crowd(spec: &Spec) -> bool {
+    let most = spec.storm.troubles.max_crowd;
+    most > spec.storm.troubles.max_uavs && usize::from(most) > spec.uavs.len()
+}
+
 /// More UAVs than any other fleet has.
 fn crowd(s: &mut Stream, spec: &mut Spec, _: u64) {
     let troubles = spec.storm.troubles;
@@ -834,6 +841,16 @@ mod tests {
         let n = crowded.count();
         assert!((70..130).contains(&n), "{n}");
         assert!(sizes.len() > 12, "{sizes:?}");
+    }
+
+    #[test]
+    fn a_swarm_that_is_more_than_a_crowd_is_not_thinned_to_one() {
+        let mut spec = spec();
+        let most = usize::from(spec.storm.troubles.max_crowd);
+        for (n, can) in [(most - 1, true), (most, false), (100, false)] {
+            resize(&mut spec, n);
+            assert_eq!(can_be_a_crowd(&spec), can, "{n}");
+        }
     }
 
     #[test]
