@@ -5,6 +5,9 @@
 //! sense. Most do not go together at first. What the reader refuses is drawn again, left out or
 //! given more room, field by field as the error names them, until all of it is taken.
 //!
+//! From seed 10,000 on there is more: gimbals, patrols, sites where vehicles are counted, a mass
+//! event that is watched, fleets at one height.
+//!
 //! # Guarantees
 //! One seed gives the same text on every machine.
 
@@ -15,6 +18,9 @@ use crate::resolve::{Scenario, parse_with};
 use core::fmt::Write;
 use skein_geometry::math::{PI, TAU, sin_cos};
 use skein_geometry::random::{SplitMix64, mix};
+
+/// Missions from this seed on ask for more than coverage, tasks and targets.
+const MORE_FROM: u64 = 10_000;
 
 /// So often something is mended before a draw is given up.
 const TRIES: usize = 60;
@@ -106,6 +112,7 @@ struct Flyer {
     reserve_s: usize,
     across_deg: f64,
     along_deg: f64,
+    gimbal: Option<String>,
 }
 
 impl Flyer {
@@ -119,6 +126,7 @@ impl Flyer {
             reserve_s: random.whole(60, 300),
             across_deg: random.between(80.0, 115.0),
             along_deg: random.between(70.0, 95.0),
+            gimbal: None,
         }
     }
 
@@ -131,7 +139,7 @@ impl Flyer {
         format!(
             "{{ stall_mps: {:.2}, cruise_mps: {:.2}, max_mps: {:.2}, bank_deg: {:.1}, \
              endurance_s: {:.0}, reserve_s: {}, camera: {{ fov_across_deg: {:.1}, \
-             fov_along_deg: {:.1} }} }}",
+             fov_along_deg: {:.1}{} }} }}",
             self.stall_mps,
             self.cruise_mps,
             self.max_mps,
@@ -139,7 +147,8 @@ impl Flyer {
             self.endurance_s,
             self.reserve_s,
             self.across_deg,
-            self.along_deg
+            self.along_deg,
+            self.gimbal.as_deref().unwrap_or_default()
         )
     }
 }
@@ -167,6 +176,17 @@ struct Parts {
     periods: String,
     operator: Vec<String>,
     targets: Option<(String, Option<String>, Option<String>)>,
+    more: More,
+}
+
+/// What missions ask for besides, each as it stands in the file.
+#[derive(Default)]
+struct More {
+    patrol: Option<String>,
+    counts: Option<String>,
+    watched: Option<String>,
+    people: Option<String>,
+    separation: Option<&'static str>,
 }
 
 impl Parts {
@@ -231,6 +251,7 @@ impl Parts {
             operator: Vec::new(),
             targets: r.is(0.3).then(|| targets(r, size_m)),
             flyers,
+            more: More::default(),
         };
         if r.is(0.2) {
             parts.style += "division: \"backtracking\", ";
@@ -242,7 +263,65 @@ impl Parts {
         if r.is(0.6) {
             parts.operator = operator(r, size_m, uavs);
         }
+        if seed >= MORE_FROM {
+            parts.ask_for_more(r);
+        }
         parts
+    }
+
+    fn ask_for_more(&mut self, r: &mut Random) {
+        let size_m = self.size_m;
+        if r.is(0.3) {
+            for flyer in &mut self.flyers {
+                flyer.gimbal = Some(format!(
+                    ", mount: {{ gimbal: {{ roll_deg: {}, pitch_deg: {}, rate_dps: {} }} }}",
+                    r.whole(35, 60),
+                    r.whole(20, 40),
+                    r.whole(40, 150)
+                ));
+            }
+        }
+        let is_patrol = r.is(0.5);
+        let once = !matches!(
+            self.asked,
+            Asked::Layers
+                | Asked::Area {
+                    planner: "exact",
+                    ..
+                }
+        );
+        if is_patrol && once {
+            if let Asked::Area { laps, .. } = &mut self.asked {
+                *laps = 1;
+            }
+            // Long enough for one UAV to fly all of it, if it is the last.
+            let slowest_mps = self.flyers.iter().map(|f| f.cruise_mps);
+            let slowest_mps = slowest_mps.fold(f64::INFINITY, f64::min);
+            let once_s = size_m.0 * size_m.1 / self.spacing_m / slowest_mps;
+            let for_s = r.between(1.3, 1.8) * once_s + 600.0;
+            self.more.patrol = Some(format!("diagram: \"patrol\", for_s: {for_s:.0}"));
+        }
+        if r.is(0.4) {
+            let vehicles = vehicles(r, size_m);
+            let sites: Vec<String> = (0..r.whole(1, 4)).map(|n| site(r, size_m, n)).collect();
+            self.targets = Some((vehicles, None, None));
+            self.more.counts = Some(format!("counts: [{}]", sites.join(", ")));
+        }
+        if r.is(0.2) {
+            let (watched, people) = event(r, size_m);
+            (self.more.watched, self.more.people) = (Some(watched), Some(people));
+        }
+        if r.is(0.15) {
+            self.more.separation = Some(", separation_m: 30");
+            (self.wind, self.uavs) = (None, self.uavs.min(8));
+            self.radio = format!(
+                "range_m: {}, rate_bps: {}, loss_percent: {:.1}, delay_ms: {}, queue_age_ms: 2000",
+                r.whole(500, 1_800),
+                r.of(&[250_000, 1_000_000]),
+                r.between(0.0, 15.0),
+                r.whole(1, 100)
+            );
+        }
     }
 
     fn text(&self) -> String {
@@ -268,6 +347,11 @@ impl Parts {
             }
         }
         let mut more = String::new();
+        let asked_besides = [&self.more.patrol, &self.more.counts, &self.more.watched];
+        mission.extend(asked_besides.into_iter().flatten().cloned());
+        if let Some(people) = &self.more.people {
+            let _ = write!(more, "{people},\n  ");
+        }
         if let Some((vehicles, criterion, service)) = &self.targets {
             let _ = write!(more, "vehicles: [{vehicles}],\n  ");
             mission.extend(criterion.as_ref().map(|c| format!("detections: [{c}]")));
@@ -293,7 +377,7 @@ impl Parts {
              {asked},\n  no_fly: [{zones}],\n  {more}{style}level_m: {level_m},\n  \
              lanes: {{ spacing_m: {spacing_m}, tracking_error_m: 3 }},\n  base: {base},\n  \
              airframes: {{\n    first: {first},\n    second: {second},\n  }},\n  \
-             fleet: {{ count: {uavs}, airframes: {dealt}, launch: {launch}, {fleet} }},\n  \
+             fleet: {{ count: {uavs}, airframes: {dealt}, launch: {launch}, {fleet}{separation} }},\n  \
              ground: {{ id: 100, height_m: 2.5, {ground} }},\n  radio: {{ {radio} }},\n  {periods},\n  \
              operator: [{operator}],\n  faults: [],\n  \
              storm: {{ max_kills: {kills}, until: 0.5, max_loss_percent: 30, max_partitions: 2, \
@@ -310,6 +394,7 @@ impl Parts {
             uavs = self.uavs,
             launch = self.launch,
             fleet = self.fleet,
+            separation = self.more.separation.unwrap_or_default(),
             ground = self.ground.trim_matches(['{', '}', ' ']),
             radio = self.radio,
             periods = self.periods,
@@ -330,10 +415,26 @@ impl Parts {
             self.operator.remove(n);
         } else if let Some(n) = nth("no_fly").filter(|n| *n < self.zones.len()) {
             self.zones.remove(n);
+        } else if problem.contains("gimbal") {
+            for flyer in &mut self.flyers {
+                flyer.gimbal = None;
+            }
+        } else if self.more.watched.is_some()
+            && (field.starts_with("mission.crowd") || field.starts_with("crowd"))
+        {
+            (self.more.watched, self.more.people) = (None, None);
+        } else if self.more.counts.is_some() && field.starts_with("mission") {
+            self.more.counts = None;
+        } else if self.more.separation.is_some()
+            && (field.starts_with("fleet") || problem.contains("separation"))
+        {
+            self.more.separation = None;
         } else if self.targets.is_some()
             && (field.starts_with("vehicles") || field.starts_with("mission"))
         {
             self.targets = None;
+        } else if self.more.patrol.is_some() && field.starts_with("mission") {
+            self.more.patrol = None;
         } else if field.starts_with("base") {
             self.base = place(r, self.size_m, 200.0);
         } else if field.starts_with("fleet") {
@@ -547,6 +648,81 @@ fn targets(r: &mut Random, size_m: (f64, f64)) -> (String, Option<String>, Optio
         format!("{{ base: {base}, speed_mps: {mps:.1} }}")
     });
     (vehicles.join(", "), criterion, service)
+}
+
+/// Vehicles that drive to and fro, and some that stand.
+fn vehicles(r: &mut Random, size_m: (f64, f64)) -> String {
+    let group = |r: &mut Random| {
+        let way: Vec<(f64, f64)> = (0..r.whole(2, 5)).map(|_| corner(r, size_m)).collect();
+        format!(
+            "{{ ways_m: [{}], count: {}, speed_mps: {:.1}, does: \"{}\", kind: \"{}\" }}",
+            ring(&way),
+            r.whole(1, 8),
+            r.between(3.0, 12.0),
+            r.of(&["drives", "stops-and-goes"]),
+            r.of(&["car", "lorry", "bus"])
+        )
+    };
+    let groups: Vec<String> = (0..r.whole(1, 3)).map(|_| group(r)).collect();
+    groups.join(", ")
+}
+
+/// Where vehicles are counted.
+fn site(r: &mut Random, size_m: (f64, f64), nth: usize) -> String {
+    let (x, y) = corner(r, size_m);
+    format!(
+        "{{ name: \"site-{nth}\", what: \"{}\", circle: {{ east_m: {x:.0}, north_m: {y:.0}, \
+         radius_m: {} }} }}",
+        r.of(&["passing", "standing"]),
+        r.whole(12, 30)
+    )
+}
+
+/// A mass event: how it is watched, and who is there.
+fn event(r: &mut Random, (width_m, height_m): (f64, f64)) -> (String, String) {
+    let side = |r: &mut Random, m: f64| {
+        let low = r.between(0.05, 0.4) * m;
+        (low, low + r.between(80.0, 300.0).min(m - low))
+    };
+    let (x, y) = (side(r, width_m), side(r, height_m));
+    let rectangle = |(west, east): (f64, f64), (south, north): (f64, f64)| {
+        format!(
+            "{{ west_m: {west:.0}, south_m: {south:.0}, east_m: {east:.0}, north_m: {north:.0} }}"
+        )
+    };
+    let part = |r: &mut Random, (low, high): (f64, f64)| {
+        let from = r.between(low, low + 0.6 * (high - low));
+        (from, from + (0.35 * (high - low)).max(10.0))
+    };
+    let then = r.of(&["look", "circle"]);
+    let circles = if then == "circle" {
+        ", circles_max: 1"
+    } else {
+        ""
+    };
+    let watched = format!(
+        "crowd: {{ area: {}, sector_m: {}, interval_s: {}, dense_per_m2: 1.8, \
+         eased_per_m2: 1.4, then: \"{then}\"{circles}, look_every_s: {} }}",
+        rectangle(x, y),
+        r.of(&[20, 30]),
+        r.whole(20, 60),
+        r.whole(30, 90)
+    );
+    let group = |r: &mut Random| {
+        let (from_s, over_s) = (r.whole(30, 400), r.whole(60, 300));
+        format!(
+            "{{ people: {}, stands: {}, goes: [{{ from_s: {from_s}, over_s: {over_s}, to: {} }}] }}",
+            r.whole(100, 3_000),
+            rectangle(part(r, x), part(r, y)),
+            rectangle(part(r, x), part(r, y))
+        )
+    };
+    let groups: Vec<String> = (0..r.whole(1, 3)).map(|_| group(r)).collect();
+    let people = format!(
+        "crowd: {{ vary_people: 0.1, vary_s: 30, groups: [{}] }}",
+        groups.join(", ")
+    );
+    (watched, people)
 }
 
 /// What the operator does, one thing after the other.

@@ -22,6 +22,10 @@ const MOST_M: f64 = 200.0;
 const HELD_M: f64 = 3.0;
 const LOOKS: u32 = 100;
 
+/// From higher up the same angle is more, metres for a metre of height.
+const HELD_M_PER_M: f64 = 0.02;
+const LEVEL_M: f64 = 100.0;
+
 /// How far pictures were from where they were planned, in one run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FootprintErrors {
@@ -52,12 +56,12 @@ pub struct FootprintCheck {
 }
 
 impl FootprintCheck {
-    /// A UAV looked; `is_held` says whether a gimbal holds its picture.
+    /// A UAV looked from this height; `is_held` says whether a gimbal holds its picture.
     pub fn on_look(
         &mut self,
         (now_ms, uav): (u64, u16),
         footprint: Footprint,
-        picture: &Picture,
+        (picture, height_m): (&Picture, f64),
         is_held: bool,
         found: &mut Findings,
     ) {
@@ -87,7 +91,8 @@ impl FootprintCheck {
         }
         let mean_m = *sum_m / f64::from(*looks);
         (*sum_m, *looks) = (0.0, 0);
-        if mean_m > HELD_M {
+        let higher_m = (height_m - LEVEL_M).max(0.0);
+        if mean_m > HELD_M + HELD_M_PER_M * higher_m {
             found.broken("footprint", now_ms, Some(uav), || {
                 format!("its pictures are {mean_m:.1} m from where they are planned, on the mean of {LOOKS}")
             });
@@ -135,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_picture_that_is_not_held_is_told_once_its_mean_is_known() {
-        let broken = |off_m: f64, is_held: bool| {
+        let broken = |off_m: f64, from_m: f64, is_held: bool| {
             let (mut check, mut found) = (FootprintCheck::default(), Findings::new(1));
             for look in 0..150_u32 {
                 let at = Point::new(f64::from(look), 0.0);
@@ -148,15 +153,16 @@ mod tests {
                     },
                 };
                 let when = (200 * u64::from(look), 1);
-                check.on_look(when, footprint, &picture, is_held, &mut found);
+                check.on_look(when, footprint, (&picture, from_m), is_held, &mut found);
             }
             let at_ms: Vec<u64> = found.violations.iter().map(|v| v.time_ms).collect();
             (at_ms, check.errors())
         };
-        let (at_ms, errors) = broken(3.5, true);
+        let (at_ms, errors) = broken(3.5, 100.0, true);
         assert_eq!(at_ms, [99 * 200]);
         assert_eq!((errors.seen, errors.missed, errors.looks), (14, 2, 150));
         assert!((errors.mean_m - 3.5).abs() < 1e-9 && (errors.p99_m - 3.6).abs() < 0.11);
-        assert!(broken(2.5, true).0.is_empty() && broken(9.0, false).0.is_empty());
+        assert!(broken(2.5, 60.0, true).0.is_empty() && broken(9.0, 100.0, false).0.is_empty());
+        assert!(broken(4.9, 200.0, true).0.is_empty() && broken(5.1, 200.0, true).0.len() == 1);
     }
 }

@@ -146,9 +146,13 @@ impl Swarm {
         let is_held = body.airframe().mount.gimbal().is_some();
         let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
         let look = (self.now_ms, id);
-        rules
-            .footprint
-            .on_look(look, footprint, &body.picture(), is_held, found);
+        rules.footprint.on_look(
+            look,
+            footprint,
+            (&body.picture(), body.height_m()),
+            is_held,
+            found,
+        );
     }
 
     /// What the ground station knows of counts, beside what is true.
