@@ -331,6 +331,10 @@ impl Sections {
         self.held.retain(|c, s| !outbid(*c, *s));
         let changed = before != (self.plan.len(), self.held.len());
         self.news.listing |= changed;
+        if changed {
+            // A run of which others took the middle is two.
+            self.trim();
+        }
         changed
     }
 
@@ -604,6 +608,7 @@ impl Sections {
     pub fn give_up(&mut self, cells: &[u16]) {
         self.plan.retain(|p| !cells.contains(&p.cell));
         self.news.listing = true;
+        self.trim();
     }
 
     /// Keeps only the first `count` planned cells; the others become orphans.

@@ -166,6 +166,30 @@ fn what_does_not_fit_into_a_register_is_not_planned() {
     assert_eq!(listed, s.plan().iter().map(|p| p.cell).collect::<Vec<_>>());
 }
 
+/// Of sixteen runs one is cut in two: the last one would be planned, and no claim would say so.
+#[test]
+fn what_no_longer_fits_after_a_cell_was_lost_or_given_up_is_not_planned() {
+    let n = 100;
+    let runs: Vec<(u16, Direction)> = (0..n)
+        .filter(|c| c % 6 < 3)
+        .take(3 * PLAN_MAX)
+        .map(|c| (c, Direction::Forward))
+        .collect();
+    let cut: [fn(&mut Sections); 2] = [
+        |s| assert!(s.hear(2, 1, 1, claim(&[(13, 1, stamp(5, 3, 2))]))),
+        |s| s.give_up(&[13]),
+    ];
+    for cut in cut {
+        let mut s = Sections::new(1, n, CellSet::new(n));
+        s.adopt_at_once(epoch(1), &[], &runs);
+        assert_eq!(s.plan().len(), 3 * PLAN_MAX);
+        cut(&mut s);
+        s.settle(&[(2, 1)].into_iter().collect());
+        assert_eq!(s.plan().len(), 3 * PLAN_MAX - 4);
+        assert_eq!(unpack(&s.claim(1, 1, 0).plan, n), s.plan());
+    }
+}
+
 #[test]
 fn what_another_has_left_are_the_open_cells_of_its_newest_plan() {
     let mut sections = Sections::new(1, 10, CellSet::of(10, [4]));
