@@ -29,6 +29,7 @@ use skein_flight::coverage::ring::Direction;
 use skein_geometry::Segment;
 use skein_geometry::frame::Pose;
 use skein_geometry::math::{cos, wrap_pi, wrap_tau};
+use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
 /// By how much slower somebody flies for each metre by which who is ahead is nearer than who is
@@ -54,9 +55,18 @@ const AGAINST_M: f64 = 60.0;
 /// In a wind the airspeed stays at least so many times as high.
 const WINDS: f64 = 2.0;
 
+/// Where the loop leads along the same ground twice somebody stays on the part on which it was,
+/// until another one is nearer by so much, metres.
+const SAME_M: f64 = 30.0;
+
+/// No farther along the loop than this from one look to the next, metres.
+const MOVED_M: f64 = 300.0;
+
 /// Another one who flies round the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fellow {
+    /// Which one it is.
+    pub id: u16,
     /// Where it was, and where its nose pointed.
     pub pose: Pose,
     /// How long ago, milliseconds.
@@ -102,6 +112,8 @@ struct Measured<'a> {
     marks: &'a [Mark],
     begins_m: Vec<f64>,
     whole_m: f64,
+    /// Where the others were on it at the last look.
+    places_m: BTreeMap<u16, f64>,
 }
 
 /// How a UAV keeps its place among others.
@@ -110,6 +122,9 @@ pub(super) struct Circuit {
     /// None before the loop is flown round.
     marks: Vec<Mark>,
     gaps: Option<Gaps>,
+    /// Where it was on the loop at the last look, and the others, metres.
+    here_m: Option<f64>,
+    places_m: BTreeMap<u16, f64>,
 }
 
 impl Circuit {
@@ -180,30 +195,65 @@ impl Transit {
             marks,
             begins_m: begins_m.collect(),
             whole_m,
+            places_m: BTreeMap::new(),
         }
     }
 }
 
 impl Measured<'_> {
     /// How far along the loop a pose is, through the air, metres. `None` where it is not on it.
-    /// Who circles there has that much less of it behind it as is left of its circle.
-    fn along_m(&self, pose: Pose) -> Option<f64> {
-        let (mark, on_m) = nearest(self.marks, pose)?;
-        let before_m = mark.share * self.transit.forward_m(mark.cell);
+    /// Who circles there has that much less of it behind it as is left of its circle. Where it was
+    /// at the last look tells parts apart that lie beside or upon one another.
+    fn along_m(&self, pose: Pose, was_m: Option<f64>) -> Option<f64> {
+        let best = self.nearest(pose, |_| true)?;
+        let same = was_m.and_then(|was_m| {
+            self.nearest(pose, |mark| {
+                let off_m = (self.begins_at_m(mark) - was_m).rem_euclid(self.whole_m);
+                off_m.min(self.whole_m - off_m) <= MOVED_M
+            })
+        });
+        let (_, mark) = same.filter(|s| s.0 <= best.0 + SAME_M).unwrap_or(best);
+        let off = pose.position() - mark.pose.position();
+        let on_m = off.dot(&mark.pose.direction()).clamp(-MARK_M, MARK_M);
         let left_m = self.transit.wide_circle_m() * circle_left(&mark.pose, pose);
-        Some(self.begins_m[usize::from(mark.cell)] + before_m + on_m - left_m)
+        Some(self.begins_at_m(mark) + on_m - left_m)
+    }
+
+    /// How far along the loop a mark is, through the air, metres.
+    fn begins_at_m(&self, mark: &Mark) -> f64 {
+        let before_m = mark.share * self.transit.forward_m(mark.cell);
+        self.begins_m[usize::from(mark.cell)] + before_m
+    }
+
+    /// The place on some of the loop that is nearest to a pose, and how far off it counts as,
+    /// metres. `None` where the pose is not on it.
+    fn nearest(&self, pose: Pose, is_meant: impl Fn(&Mark) -> bool) -> Option<(f64, &Mark)> {
+        let cost_m = |mark: &Mark| {
+            let off = pose.position() - mark.pose.position();
+            (off.dot(&off) <= OFF_M * OFF_M).then(|| {
+                let turned = cos(pose.heading_rad - mark.pose.heading_rad);
+                off.norm() + AGAINST_M * (1.0 - turned)
+            })
+        };
+        let costs = self.marks.iter().filter_map(|m| Some((cost_m(m)?, m)));
+        let meant = costs.filter(|(_, mark)| is_meant(mark));
+        meant.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// Who is next ahead of somebody so far along the loop and who behind. `None` where nobody
     /// else is on it.
-    fn gaps(&self, at_m: f64, others: &[Fellow]) -> Option<Gaps> {
+    fn gaps(&mut self, at_m: f64, others: &[Fellow]) -> Option<Gaps> {
         let speed_mps = self.transit.air().airspeed_mps;
-        let ahead_m = |other: &Fellow| {
-            let then_m = self.along_m(other.pose)?;
+        let was_m = std::mem::take(&mut self.places_m);
+        let mut places_m = BTreeMap::new();
+        let mut ahead_m = |other: &Fellow| {
+            let then_m = self.along_m(other.pose, was_m.get(&other.id).copied())?;
+            places_m.insert(other.id, then_m);
             let now_m = then_m + speed_mps * f64::from(other.age_ms) / 1000.0;
             Some((now_m - at_m).rem_euclid(self.whole_m))
         };
-        let all: Vec<f64> = others.iter().filter_map(ahead_m).collect();
+        let all: Vec<f64> = others.iter().filter_map(&mut ahead_m).collect();
+        self.places_m = places_m;
         let ahead_m = all.iter().copied().min_by(f64::total_cmp)?;
         let farthest_m = all.iter().copied().max_by(f64::total_cmp)?;
         Some(Gaps {
@@ -211,23 +261,6 @@ impl Measured<'_> {
             behind_m: self.whole_m - farthest_m,
         })
     }
-}
-
-/// The place on the loop that is nearest to a pose, and how far on from there the pose is, metres.
-/// `None` where it is not on the loop.
-fn nearest(marks: &[Mark], pose: Pose) -> Option<(&Mark, f64)> {
-    let cost_m = |mark: &Mark| {
-        let off = pose.position() - mark.pose.position();
-        (off.dot(&off) <= OFF_M * OFF_M).then(|| {
-            let turned = cos(pose.heading_rad - mark.pose.heading_rad);
-            off.norm() + AGAINST_M * (1.0 - turned)
-        })
-    };
-    let costs = marks.iter().filter_map(|m| Some((cost_m(m)?, m)));
-    let (_, nearest) = costs.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let off = pose.position() - nearest.pose.position();
-    let on_m = off.dot(&nearest.pose.direction());
-    Some((nearest, on_m.clamp(-MARK_M, MARK_M)))
 }
 
 /// What share of its circle somebody has left who circles beside the loop; 0 for who flies along
@@ -256,19 +289,24 @@ impl Executive {
         if self.circuit.marks.is_empty() {
             self.circuit.marks = self.transit.marks();
         }
-        let measured = self.transit.measured(&self.circuit.marks);
+        let mut measured = self.transit.measured(&self.circuit.marks);
+        measured.places_m = std::mem::take(&mut self.circuit.places_m);
+        let was_m = self.circuit.here_m;
         let along_m = match self.stretches.front() {
             Some(Stretch {
                 kind: Kind::Loiter(_),
                 end_m,
                 end,
             }) => {
-                let end_along_m = measured.along_m(end.pose);
+                let end_along_m = measured.along_m(end.pose, was_m);
                 end_along_m.map(|m| m - self.air_m_until(*end_m))
             }
-            _ => measured.along_m(here),
+            _ => measured.along_m(here, was_m),
         };
-        self.circuit.gaps = along_m.and_then(|m| measured.gaps(m, others));
+        let gaps = along_m.and_then(|m| measured.gaps(m, others));
+        let places_m = measured.places_m;
+        (self.circuit.here_m, self.circuit.places_m) = (along_m, places_m);
+        self.circuit.gaps = gaps;
         self.give_up_circle();
     }
 
@@ -381,6 +419,7 @@ mod tests {
         wing.pose = on(&executive, 10);
         executive.step(&wing.percept(), &|_| false);
         let fellow = |boundary| Fellow {
+            id: 2 + boundary as u16,
             pose: on(&executive, boundary),
             age_ms: 0,
         };
@@ -394,6 +433,7 @@ mod tests {
         assert!(speed(&[near]) < full_mps);
         // The same two seen from the other side: who is behind is nearer.
         let behind = Fellow {
+            id: 1,
             pose: on(&executive, 8),
             age_ms: 0,
         };
@@ -405,6 +445,7 @@ mod tests {
         assert!(is_full(speed(&[behind, far])));
         assert!(is_full(speed(&[])));
         let away = Fellow {
+            id: 1,
             pose: Pose::new(Point::new(-900.0, -900.0), 0.0),
             age_ms: 0,
         };
@@ -417,7 +458,7 @@ mod tests {
         let marks = all[0].1.transit.marks();
         let measured = all[0].1.transit.measured(&marks);
         let whole_m = measured.whole_m;
-        let at = all.iter().map(|(w, _)| measured.along_m(w.pose));
+        let at = all.iter().map(|(w, _)| measured.along_m(w.pose, None));
         let Some(at) = at.collect::<Option<Vec<f64>>>() else {
             return f64::INFINITY;
         };
@@ -447,11 +488,12 @@ mod tests {
     }
 
     fn told(all: &[(Wing, Executive)], age_ms: u32) -> Vec<Fellow> {
-        let fellow = |(wing, _): &(Wing, Executive)| Fellow {
+        let fellow = |(id, (wing, _)): (u16, &(Wing, Executive))| Fellow {
+            id,
             pose: wing.pose,
             age_ms,
         };
-        all.iter().map(fellow).collect()
+        (0..).zip(all).map(fellow).collect()
     }
 
     #[test]
@@ -512,6 +554,55 @@ mod tests {
         assert!(slowest < 600, "{slowest}");
     }
 
+    /// Where the loop leads along the same ground twice, it is one place that changes by little:
+    /// an airspeed that follows from two in turn would change with each look.
+    #[test]
+    fn who_flies_where_the_loop_leads_twice_stays_on_one_of_the_two() {
+        let wing = Wing::new(Pose::new(Point::new(0.0, 0.0), 0.0));
+        let executive = round(&wing);
+        let marks = executive.transit.marks();
+        let measured = executive.transit.measured(&marks);
+        let whole_m = measured.whole_m;
+        // The second half of the loop is laid upon the first, a metre beside.
+        let half = marks.len() / 2;
+        let twice: Vec<Mark> = (0..2 * half)
+            .map(|i| {
+                let on = marks[i % half].pose;
+                let d = on.direction();
+                let left = skein_geometry::frame::Vector::new(-d.y, d.x);
+                let beside_m = if i < half { 0.0 } else { 1.0 };
+                let at = on.position() + left * beside_m;
+                Mark {
+                    pose: Pose::new(at, on.heading_rad),
+                    ..marks[i]
+                }
+            })
+            .collect();
+        let measured = Measured {
+            marks: &twice,
+            ..measured
+        };
+        for first in [half / 4, half + half / 4] {
+            let mut was_m = Some(measured.begins_at_m(&twice[first]));
+            let mut swapped = 0;
+            for ahead in 1..40 {
+                let on = twice[half / 4 + ahead].pose;
+                let d = on.direction();
+                let left = skein_geometry::frame::Vector::new(-d.y, d.x);
+                let at = on.position() + left * f64::from(u8::from(ahead % 2 == 0));
+                let pose = Pose::new(at, on.heading_rad);
+                let is_m = measured.along_m(pose, was_m).unwrap();
+                let moved_m = (is_m - was_m.unwrap()).rem_euclid(whole_m);
+                let moved_m = moved_m.min(whole_m - moved_m);
+                assert!(moved_m < MOVED_M, "{first} {ahead}: {moved_m}");
+                let alone_m = measured.along_m(pose, None).unwrap();
+                swapped += u32::from((alone_m - is_m).abs() > 300.0);
+                was_m = Some(is_m);
+            }
+            assert!(swapped > 10, "{swapped}");
+        }
+    }
+
     /// Where an excursion leaves the loop it comes back: its beginning and its end are one place.
     #[test]
     fn a_place_on_the_loop_is_as_far_along_as_the_cells_before_it() {
@@ -519,7 +610,10 @@ mod tests {
         let executive = round(&wing);
         let marks = executive.transit.marks();
         let measured = executive.transit.measured(&marks);
-        let (along, whole_m) = (|pose| measured.along_m(pose).unwrap(), measured.whole_m);
+        let (along, whole_m) = (
+            |pose| measured.along_m(pose, None).unwrap(),
+            measured.whole_m,
+        );
         let cells = executive.transit.coverage_loop.cells();
         let (mut until_m, mut looked) = (0.0, 0);
         for (cell, i) in cells.iter().zip(0u16..) {

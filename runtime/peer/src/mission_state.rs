@@ -677,7 +677,7 @@ impl MissionState {
             let is_new = age_ms <= FELLOW_PERIODS * s.period_ms;
             let age_ms = u32::try_from(age_ms).ok().filter(|_| is_new)?;
             let pose = place.pose();
-            Some(Fellow { pose, age_ms })
+            Some(Fellow { id, pose, age_ms })
         };
         s.membership.live().filter_map(fellow).collect()
     }
