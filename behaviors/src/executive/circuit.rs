@@ -112,8 +112,6 @@ struct Measured<'a> {
     marks: &'a [Mark],
     begins_m: Vec<f64>,
     whole_m: f64,
-    /// Where the others were on it at the last look.
-    places_m: BTreeMap<u16, f64>,
 }
 
 /// How a UAV keeps its place among others.
@@ -195,7 +193,6 @@ impl Transit {
             marks,
             begins_m: begins_m.collect(),
             whole_m,
-            places_m: BTreeMap::new(),
         }
     }
 }
@@ -205,12 +202,14 @@ impl Measured<'_> {
     /// Who circles there has that much less of it behind it as is left of its circle. Where it was
     /// at the last look tells parts apart that lie beside or upon one another.
     fn along_m(&self, pose: Pose, was_m: Option<f64>) -> Option<f64> {
-        let best = self.nearest(pose, |_| true)?;
+        let near = near(self.marks, pose);
+        let best = least(near.iter().copied())?;
         let same = was_m.and_then(|was_m| {
-            self.nearest(pose, |mark| {
+            let is_same = |(_, mark): &(f64, &Mark)| {
                 let off_m = (self.begins_at_m(mark) - was_m).rem_euclid(self.whole_m);
                 off_m.min(self.whole_m - off_m) <= MOVED_M
-            })
+            };
+            least(near.iter().copied().filter(is_same))
         });
         let (_, mark) = same.filter(|s| s.0 <= best.0 + SAME_M).unwrap_or(best);
         let off = pose.position() - mark.pose.position();
@@ -225,35 +224,24 @@ impl Measured<'_> {
         self.begins_m[usize::from(mark.cell)] + before_m
     }
 
-    /// The place on some of the loop that is nearest to a pose, and how far off it counts as,
-    /// metres. `None` where the pose is not on it.
-    fn nearest(&self, pose: Pose, is_meant: impl Fn(&Mark) -> bool) -> Option<(f64, &Mark)> {
-        let cost_m = |mark: &Mark| {
-            let off = pose.position() - mark.pose.position();
-            (off.dot(&off) <= OFF_M * OFF_M).then(|| {
-                let turned = cos(pose.heading_rad - mark.pose.heading_rad);
-                off.norm() + AGAINST_M * (1.0 - turned)
-            })
-        };
-        let costs = self.marks.iter().filter_map(|m| Some((cost_m(m)?, m)));
-        let meant = costs.filter(|(_, mark)| is_meant(mark));
-        meant.min_by(|a, b| a.0.total_cmp(&b.0))
-    }
-
-    /// Who is next ahead of somebody so far along the loop and who behind. `None` where nobody
-    /// else is on it.
-    fn gaps(&mut self, at_m: f64, others: &[Fellow]) -> Option<Gaps> {
+    /// Who is next ahead of somebody so far along the loop and who behind, where the others were
+    /// at these places at the last look; these become those of now. `None` where nobody else is on
+    /// it.
+    fn gaps(
+        &self,
+        at_m: f64,
+        others: &[Fellow],
+        places_m: &mut BTreeMap<u16, f64>,
+    ) -> Option<Gaps> {
         let speed_mps = self.transit.air().airspeed_mps;
-        let was_m = std::mem::take(&mut self.places_m);
-        let mut places_m = BTreeMap::new();
-        let mut ahead_m = |other: &Fellow| {
-            let then_m = self.along_m(other.pose, was_m.get(&other.id).copied())?;
+        let were_m = std::mem::take(places_m);
+        let ahead_m = |other: &Fellow| {
+            let then_m = self.along_m(other.pose, were_m.get(&other.id).copied())?;
             places_m.insert(other.id, then_m);
             let now_m = then_m + speed_mps * f64::from(other.age_ms) / 1000.0;
             Some((now_m - at_m).rem_euclid(self.whole_m))
         };
-        let all: Vec<f64> = others.iter().filter_map(&mut ahead_m).collect();
-        self.places_m = places_m;
+        let all: Vec<f64> = others.iter().filter_map(ahead_m).collect();
         let ahead_m = all.iter().copied().min_by(f64::total_cmp)?;
         let farthest_m = all.iter().copied().max_by(f64::total_cmp)?;
         Some(Gaps {
@@ -261,6 +249,24 @@ impl Measured<'_> {
             behind_m: self.whole_m - farthest_m,
         })
     }
+}
+
+/// The places on the loop about a pose, and how far off each counts as, metres.
+fn near(marks: &[Mark], pose: Pose) -> Vec<(f64, &Mark)> {
+    let cost_m = |mark: &Mark| {
+        let off = pose.position() - mark.pose.position();
+        (off.dot(&off) <= OFF_M * OFF_M).then(|| {
+            let turned = cos(pose.heading_rad - mark.pose.heading_rad);
+            off.norm() + AGAINST_M * (1.0 - turned)
+        })
+    };
+    let costs = marks.iter().filter_map(|m| Some((cost_m(m)?, m)));
+    costs.collect()
+}
+
+/// The nearest of such places, of equals the first.
+fn least<'a>(near: impl Iterator<Item = (f64, &'a Mark)>) -> Option<(f64, &'a Mark)> {
+    near.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// What share of its circle somebody has left who circles beside the loop; 0 for who flies along
@@ -289,8 +295,7 @@ impl Executive {
         if self.circuit.marks.is_empty() {
             self.circuit.marks = self.transit.marks();
         }
-        let mut measured = self.transit.measured(&self.circuit.marks);
-        measured.places_m = std::mem::take(&mut self.circuit.places_m);
+        let measured = self.transit.measured(&self.circuit.marks);
         let was_m = self.circuit.here_m;
         let along_m = match self.stretches.front() {
             Some(Stretch {
@@ -303,10 +308,9 @@ impl Executive {
             }
             _ => measured.along_m(here, was_m),
         };
-        let gaps = along_m.and_then(|m| measured.gaps(m, others));
-        let places_m = measured.places_m;
-        (self.circuit.here_m, self.circuit.places_m) = (along_m, places_m);
-        self.circuit.gaps = gaps;
+        let places_m = &mut self.circuit.places_m;
+        self.circuit.gaps = along_m.and_then(|m| measured.gaps(m, others, places_m));
+        self.circuit.here_m = along_m;
         self.give_up_circle();
     }
 

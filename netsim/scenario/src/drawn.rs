@@ -650,7 +650,7 @@ fn targets(r: &mut Random, size_m: (f64, f64)) -> (String, Option<String>, Optio
     (vehicles.join(", "), criterion, service)
 }
 
-/// Vehicles that drive to and fro, and some that stand.
+/// Groups of vehicles that drive to and fro, some with stops.
 fn vehicles(r: &mut Random, size_m: (f64, f64)) -> String {
     let group = |r: &mut Random| {
         let way: Vec<(f64, f64)> = (0..r.whole(2, 5)).map(|_| corner(r, size_m)).collect();
