@@ -49,8 +49,10 @@ fn pairs_without_a_radio_keep_apart() {
 }
 
 #[test]
-fn eight_without_a_radio_cross_a_circle() {
-    check(Scene::Circle(8), JAMMED, 0..3, 1.4);
+fn eight_to_thirty_two_without_a_radio_cross_a_circle() {
+    for (n, ratio) in [(8, 1.10), (16, 1.20), (32, 1.45)] {
+        check(Scene::Circle(n), JAMMED, 0..3, ratio);
+    }
 }
 
 #[test]
