@@ -271,9 +271,45 @@ fn on_loop(spec: &Spec, geometry: &MissionGeometry, summary: &Summary, out: &mut
         );
         out.push(Finding::new(Severity::Error, "max_time_s", text));
     }
+    timed(spec, summary, out);
     launches(spec, geometry, out);
     room_at_base(spec, geometry, out);
     moved_bases(spec, geometry, out);
+}
+
+/// A mission that ends after so many seconds ends before anything else does: all has to be seen by
+/// then, and somebody has to fly as long.
+fn timed(spec: &Spec, summary: &Summary, out: &mut Vec<Finding>) {
+    let Some(ends_s) = spec.mission.ends_after_s().map(f64::from) else {
+        return;
+    };
+    let mut error = |text| out.push(Finding::new(Severity::Error, "mission.for_s", text));
+    let airframes = || spec.uavs.iter().map(|u| &u.airframe);
+    let longest_s = airframes()
+        .map(|a| a.endurance_s - a.reserve_s)
+        .fold(0.0, f64::max);
+    if ends_s >= longest_s {
+        error(format!(
+            "the mission ends after {ends_s:.0} s, and no UAV flies longer than {longest_s:.0} s before its reserve"
+        ));
+    }
+    if ends_s < summary.makespan_s {
+        error(format!(
+            "the mission ends after {ends_s:.0} s, and covering takes about {:.0} s without any failure",
+            summary.makespan_s
+        ));
+        return;
+    }
+    let mut speeds_mps: Vec<f64> = airframes().map(|a| a.cruise_mps).collect();
+    speeds_mps.sort_by(f64::total_cmp);
+    let left_mps: f64 = speeds_mps.iter().take(survivors(spec)).sum();
+    let alone_s = summary.loop_m / left_mps;
+    if ends_s < alone_s {
+        let text = format!(
+            "the mission ends after {ends_s:.0} s, and those who are left after the losses of the storm may need {alone_s:.0} s for the loop"
+        );
+        out.push(Finding::new(Severity::Warning, "mission.for_s", text));
+    }
 }
 
 /// Where the base is moved while it is flown nobody can come home to within the clearance.
@@ -541,6 +577,9 @@ mod tests {
     use super::*;
     use skein_geometry::frame::Pose;
     use skein_netsim::fault::TimedFault;
+    use skein_peer::diagram::MissionEvent;
+    use skein_peer::mission::Mission;
+    use std::sync::Arc;
 
     #[test]
     fn cells_are_clipped_by_the_area() {
@@ -683,6 +722,49 @@ mod tests {
             all.iter()
                 .any(|f| f.starts_with("warning: airframes: the weakest UAV")),
             "{all:?}"
+        );
+    }
+
+    #[test]
+    fn a_mission_that_ends_by_time_has_the_time_and_somebody_who_flies_as_long() {
+        let of = |ends_s: u32| {
+            told(3, |s| {
+                let mut diagram = crate::diagram::builtin("patrol").unwrap();
+                let timers = diagram.transitions.iter_mut();
+                timers
+                    .filter(|t| t.on == MissionEvent::Timer)
+                    .for_each(|t| t.after_s = ends_s);
+                s.mission = Arc::new(Mission {
+                    diagram: Some(Arc::new(diagram)),
+                    ..(*s.mission).clone()
+                });
+                s.storm.max_kills = 2;
+            })
+        };
+        let says = |ends_s: u32, want: &str| {
+            let all = of(ends_s);
+            let of_time = |f: &&String| f.contains("mission.for_s");
+            let found: Vec<&String> = all.iter().filter(of_time).collect();
+            match want {
+                "" => assert!(found.is_empty(), "{ends_s}: {found:?}"),
+                _ => assert!(
+                    found.iter().any(|f| f.starts_with(want)),
+                    "{ends_s}: {all:#?}"
+                ),
+            }
+        };
+        says(
+            20,
+            "error: mission.for_s: the mission ends after 20 s, and covering takes",
+        );
+        says(
+            120,
+            "warning: mission.for_s: the mission ends after 120 s, and those who are left",
+        );
+        says(600, "");
+        says(
+            80_000,
+            "error: mission.for_s: the mission ends after 80000 s, and no UAV flies longer",
         );
     }
 
