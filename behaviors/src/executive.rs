@@ -4,7 +4,7 @@
 //!
 //! An [`Executive`] keeps a track some seconds long in front of the UAV and lengthens
 //! it cell by cell. Ways between cells come from [`transit`], what the camera saw from
-//! [`camera`], the way to a given circle from [`circle`], rounds of the loop from [`circuit`], the way along a contour that is seen from [`tracing`], turns after a moving target from [`pursuit`], a flight between cells and what it
+//! [`camera`], the way to a given circle from [`circle`], rounds of the loop from [`circuit`], the way along a contour that is seen from [`tracing`], turns after a moving target from [`pursuit`], out of the way of aircraft that are no members from `evasion`, a flight between cells and what it
 //! is for from [`detour`], where a gimbal turns from `gaze`, expectations for the peer from [`prediction`], what the fuel allows
 //! from [`endurance`], what stays of a flight when the
 //! goal changes from `goal_change`, to which height it flies from [`layers`], how far a given flight reaches from [`given`], the proof of each stretch from `clearance_check`;
@@ -37,6 +37,7 @@ mod clearance_check;
 
 pub mod detour;
 pub mod endurance;
+mod evasion;
 mod gaze;
 pub mod given;
 mod goal_change;
@@ -56,6 +57,7 @@ use crate::percept::Percept;
 use crate::reactive::air::{self, Air};
 use crate::reactive::envelope::{Envelope, is_finite};
 use crate::reactive::follow::{HORIZON_S, Offset, Track};
+use crate::reactive::well_clear::WellClear;
 use crate::setpoint::{Setpoint, Side};
 use camera::{Played, look};
 use endurance::Home;
@@ -261,6 +263,8 @@ pub struct Executive {
     passes: passes::Passes,
     /// At which heights it flies, where those change.
     layered: Option<layers::Layered>,
+    /// How it makes way for aircraft that are no members.
+    well_clear: WellClear,
 }
 
 impl Executive {
@@ -302,6 +306,7 @@ impl Executive {
             tracing: tracing::Tracing::default(),
             passes: passes::Passes::default(),
             layered: None,
+            well_clear: WellClear::default(),
         }
     }
 
@@ -380,6 +385,9 @@ impl Executive {
         }
         self.report_seen(percept, is_open, &mut events);
         self.report_sighted(percept, &mut events);
+        if let Some(setpoint) = self.evade(percept) {
+            return (setpoint, events);
+        }
         if let Some(setpoint) = self.pursue(percept) {
             return (setpoint, events);
         }

@@ -1,8 +1,8 @@
 //! What a UAV senses of others near by, whether or not they speak to it: by their
-//! transponders or by remote identification.
+//! transponders, by remote identification, or by a radar of its own.
 
 use serde::{Deserialize, Serialize};
-use skein_geometry::frame::Point;
+use skein_geometry::frame::{Point, Vector};
 
 /// Most UAVs that a reading holds, the nearest. Who senses that many plans nothing new: there
 /// may be more.
@@ -39,12 +39,63 @@ impl Sighting {
     }
 }
 
+/// Most aircraft that are no members that a reading holds, the nearest.
+pub const AIRCRAFT_MAX: usize = 8;
+
+/// An aircraft that is no member: it says nothing, agrees to nothing, and makes way for nobody.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Aircraft {
+    /// Where, decimetres east of the mission's origin.
+    pub east_dm: i32,
+    /// Where, decimetres north of it.
+    pub north_dm: i32,
+    /// How high above it, decimetres.
+    pub height_dm: i32,
+    /// How fast over the ground, decimetres a second to the east.
+    pub east_dmps: i16,
+    /// And to the north.
+    pub north_dmps: i16,
+}
+
+impl Aircraft {
+    /// Where, in metres.
+    #[must_use]
+    pub fn at(&self) -> Point {
+        Point::new(
+            f64::from(self.east_dm) / 10.0,
+            f64::from(self.north_dm) / 10.0,
+        )
+    }
+
+    /// How high above the origin, in metres.
+    #[must_use]
+    pub fn height_m(&self) -> f64 {
+        f64::from(self.height_dm) / 10.0
+    }
+
+    /// How fast over the ground, m/s.
+    #[must_use]
+    pub fn velocity_mps(&self) -> Vector {
+        Vector::new(
+            f64::from(self.east_dmps) / 10.0,
+            f64::from(self.north_dmps) / 10.0,
+        )
+    }
+}
+
 /// All that is sensed of others at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Traffic {
     /// Whoever is nearer than this is sensed, metres; 0 without a sensor.
     pub range_m: f64,
     seen: [Option<Sighting>; TRAFFIC_MAX],
+    /// Those who are no members.
+    #[serde(default, skip_serializing_if = "nobody")]
+    aircraft: [Option<Aircraft>; AIRCRAFT_MAX],
+}
+
+fn nobody(aircraft: &[Option<Aircraft>; AIRCRAFT_MAX]) -> bool {
+    aircraft.iter().all(Option::is_none)
 }
 
 impl Traffic {
@@ -56,7 +107,21 @@ impl Traffic {
         for (place, sighting) in seen.iter_mut().zip(nearest_first) {
             *place = Some(sighting);
         }
-        Self { range_m, seen }
+        Self {
+            range_m,
+            seen,
+            aircraft: [None; AIRCRAFT_MAX],
+        }
+    }
+
+    /// The same with aircraft that are no members: of more than [`AIRCRAFT_MAX`] the first, so the
+    /// nearest come first.
+    #[must_use]
+    pub fn with_aircraft(mut self, nearest_first: impl IntoIterator<Item = Aircraft>) -> Self {
+        for (place, aircraft) in self.aircraft.iter_mut().zip(nearest_first) {
+            *place = Some(aircraft);
+        }
+        self
     }
 
     /// Whether there is no sensor.
@@ -75,6 +140,11 @@ impl Traffic {
     #[must_use]
     pub fn is_full(&self) -> bool {
         self.seen.iter().all(Option::is_some)
+    }
+
+    /// Aircraft that are sensed and are no members.
+    pub fn aircraft(&self) -> impl Iterator<Item = &Aircraft> {
+        self.aircraft.iter().flatten()
     }
 
     /// Who is sensed.

@@ -1,6 +1,6 @@
 //! The reactive layer: [`follow`] tracks a curve, [`promise`] a motion that was promised, [`gaze`]
 //! holds the planned footprint, [`sensed_traffic`] keeps apart from what is only sensed,
-//! [`envelope`] has the last word.
+//! [`well_clear`] from aircraft that are no members, [`envelope`] has the last word.
 
 pub mod air;
 pub mod climb;
@@ -9,3 +9,4 @@ pub mod follow;
 pub mod gaze;
 pub mod promise;
 pub mod sensed_traffic;
+pub mod well_clear;

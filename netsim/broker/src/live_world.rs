@@ -7,6 +7,7 @@ use skein_netsim::fault::Fault;
 use skein_netsim::radio::{LinkTable, Overlay};
 use skein_netsim::spec::Spec;
 use skein_netsim::witnessed::AskedLook;
+use skein_netsim::world::intruders::Intruders;
 use skein_netsim::world::{Fact, Judge, Site, Survey, World};
 use skein_peer::Call;
 use skein_peer::offload::MissionGeometry;
@@ -151,6 +152,12 @@ impl LiveWorld {
     #[must_use]
     pub fn links(&self) -> &LinkTable {
         &self.links
+    }
+
+    /// Aircraft that are no members.
+    #[must_use]
+    pub fn intruders(&self) -> &Intruders {
+        self.world.intruders()
     }
 
     /// What was seen and what went wrong.

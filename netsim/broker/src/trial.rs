@@ -747,6 +747,7 @@ impl<'a> Trial<'a> {
         self.account.conclude(Ending {
             now_ms: self.now_ms,
             judge: self.world.judge(),
+            nearest_intruder_m: self.world.intruders().nearest_m(),
             link_cuts: self.world.link_cuts(),
             violations: None,
             details: Details::Live(Live {

@@ -57,6 +57,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/helsinki_wind.json5"),
     ),
     (
+        "airspace",
+        "airspace.json5",
+        include_str!("../../../configs/trials/airspace.json5"),
+    ),
+    (
         "border",
         "border.json5",
         include_str!("../../../configs/trials/border.json5"),

@@ -46,6 +46,8 @@ mod flight_model;
 mod forecast;
 #[cfg(test)]
 mod gathered;
+#[cfg(test)]
+mod intruded;
 mod mission;
 mod mounts;
 #[cfg(test)]

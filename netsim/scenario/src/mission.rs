@@ -4,6 +4,7 @@
 
 use crate::flight_model::turn_radius_m;
 use crate::mounts::{check_mounts, held_footprint_m};
+use crate::read::fleet::Member;
 use crate::read::targets::Asked;
 use crate::read::{Stated, layers};
 use crate::request::AreaPlanner;
@@ -12,6 +13,7 @@ use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
 use skein_geometry::{NoFlyZones, Polygon};
 use skein_interop::json::Error;
+use skein_netsim::world::intruders;
 use skein_peer::diagram::DiagramError;
 use skein_peer::mission::{mm, ring_mm};
 use skein_peer::wire::tasks::TaskKind;
@@ -100,6 +102,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
     check_mounts(s)?;
     layers::check(s, &mission)?;
     check_separation(s, &mission)?;
+    check_intruders(s)?;
     check_diagram(s, &mission)?;
     check_brought(s, &mission)?;
     check_size(s)?;
@@ -133,11 +136,47 @@ pub(crate) fn traffic_range_m(s: &Stated, mission: &Mission) -> f64 {
     if mission.layers.is_some() {
         return layers::SENSED_M;
     }
-    if s.fleet.separation_m <= 0.0 {
+    let least_m = if s.fleet.separation_m > 0.0 {
+        mission.least_traffic_range_m()
+    } else {
+        least_range_to_intruders_m(s)
+    };
+    s.fleet.traffic_range_m.unwrap_or_else(|| least_m.ceil())
+}
+
+/// How far aircraft have to be sensed for every UAV to make way for every intruder of the
+/// scenario, metres; 0 where there are none.
+fn least_range_to_intruders_m(s: &Stated) -> f64 {
+    let fastest_mps = s.intruders.iter().map(|i| i.speed_mps).reduce(f64::max);
+    let Some(fastest_mps) = fastest_mps else {
         return 0.0;
+    };
+    let wind_mps = s.wind.strongest_held().speed_mps();
+    let of = |m: &Member| intruders::least_range_m(&m.airframe, fastest_mps + wind_mps);
+    s.fleet.members.iter().map(of).fold(0.0, f64::max)
+}
+
+/// Way is made for intruders by who flies at a height of its own.
+fn check_intruders(s: &Stated) -> Result<(), Error> {
+    if s.intruders.is_empty() {
+        return Ok(());
     }
-    let stated = s.fleet.traffic_range_m;
-    stated.unwrap_or_else(|| mission.least_traffic_range_m().ceil())
+    if s.fleet.separation_m > 0.0 || !s.layers_m.is_empty() {
+        return Err(s.places.wrong(
+            "intruders",
+            "UAVs that keep apart by agreement, at one height or in layers, make way for nobody else yet; leave out intruders, or fleet.separation_m and mission.layers_m",
+        ));
+    }
+    let least_m = least_range_to_intruders_m(s).ceil();
+    match s.fleet.traffic_range_m {
+        Some(range_m) if range_m < least_m => Err(s.places.wrong(
+            "fleet.traffic_range_m",
+            format!(
+                "{range_m} m are too short to make way for an intruder that flies straight at a UAV; expected at least {least_m} m"
+            ),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// What flying at one height by agreement asks for.

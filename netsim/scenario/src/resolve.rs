@@ -149,6 +149,7 @@ fn spec(s: &Stated, geometry: &MissionGeometry) -> Spec {
         traffic_range_m: traffic_range_m(s, &geometry.mission),
         vehicles: s.vehicles.clone(),
         services: s.services.clone(),
+        intruders: s.intruders.clone(),
         contour: s.contour.clone(),
         crowd: s.crowd_there.clone(),
         faults: with_operator(s),

@@ -60,6 +60,8 @@ pub struct Spec {
     pub vehicles: Vec<VehicleSpec>,
     /// Services on the ground, which drive to what the ground station knows to be followed.
     pub services: Vec<ServiceSpec>,
+    /// Aircraft that are no members of the fleet and make way for nobody.
+    pub intruders: Vec<IntruderSpec>,
     /// A road or a fire that no peer knows, of which cameras see what is in their pictures.
     pub contour: Option<ContourSpec>,
     /// The people of a mass event, of whom cameras see those in their pictures.
@@ -166,6 +168,38 @@ pub struct ServiceSpec {
     pub speed_mps: f64,
     /// The streets along which it goes; straight where there are none.
     pub streets: Option<Arc<Network>>,
+}
+
+/// An aircraft that is no member of the fleet: it says nothing and makes way for nobody.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IntruderSpec {
+    /// What it is called in reports.
+    pub name: String,
+    /// When it comes first, milliseconds.
+    pub from_ms: u64,
+    /// How long after that it comes again, and again, milliseconds; once where none is said.
+    pub every_ms: Option<u64>,
+    /// How fast over the ground, m/s.
+    pub speed_mps: f64,
+    /// How high above the origin, metres.
+    pub height_m: f64,
+    /// Where it flies.
+    pub way: IntruderWay,
+}
+
+/// Where an intruder flies.
+#[derive(Clone, Debug, PartialEq)]
+pub enum IntruderWay {
+    /// From the first place to the last, straight between them.
+    Places(Vec<Point>),
+    /// Each time straight on another course, drawn by the run's seed, over some place of this
+    /// circle.
+    Over {
+        /// Its middle.
+        middle: Point,
+        /// Its radius, metres.
+        radius_m: f64,
+    },
 }
 
 /// A contour that no peer knows.

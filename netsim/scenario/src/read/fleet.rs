@@ -97,6 +97,8 @@ pub(crate) fn read(
     over: &Overrides,
 ) -> Result<Fleet, Error> {
     let airframes = &airframes(f.need("airframes", "{ swift: { ... } }")?, level_m)?;
+    let intruders = f.get("intruders").map_or(Ok(Vec::new()), Node::items)?;
+    let meets_others = !intruders.is_empty();
     let node = f.need(
         "fleet",
         "{ count: 8, airframes: [\"swift\"], launch: \"spread\" }",
@@ -155,10 +157,10 @@ pub(crate) fn read(
     let traffic_range_m = range
         .map(|n| n.number(0.0, 20_000.0, "metres"))
         .transpose()?;
-    if let Some(node) = range.filter(|_| separation_m <= 0.0) {
-        return Err(
-            node.wrong("only UAVs that fly at one height sense each other; give separation_m too")
-        );
+    if let Some(node) = range.filter(|_| separation_m <= 0.0 && !meets_others) {
+        return Err(node.wrong(
+            "only UAVs that fly at one height sense each other; give separation_m too, or intruders",
+        ));
     }
     Ok(Fleet {
         key,

@@ -8,6 +8,7 @@ pub(crate) mod crowd;
 pub(crate) mod detections;
 pub(crate) mod faults;
 pub(crate) mod fleet;
+mod intruders;
 pub(crate) mod lanes;
 pub(crate) mod layers;
 pub(crate) mod operator;
@@ -40,7 +41,8 @@ use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{
-    ContourSpec, CrowdSpec, GroundStationSpec, RadioSpec, ServiceSpec, StormSpec, VehicleSpec,
+    ContourSpec, CrowdSpec, GroundStationSpec, IntruderSpec, RadioSpec, ServiceSpec, StormSpec,
+    VehicleSpec,
 };
 use skein_netsim::weather::Weather;
 use skein_peer::buildings::Buildings;
@@ -87,6 +89,7 @@ const FIELDS: &[&str] = &[
     "operator",
     "vehicles",
     "services",
+    "intruders",
     "contour",
     "crowd",
     "storm",
@@ -138,6 +141,8 @@ pub(crate) struct Stated {
     pub(crate) vehicles: Vec<VehicleSpec>,
     /// Services on the ground.
     pub(crate) services: Vec<ServiceSpec>,
+    /// Aircraft that are no members.
+    pub(crate) intruders: Vec<IntruderSpec>,
     /// A road or a fire that no peer knows.
     pub(crate) contour: Option<ContourSpec>,
     /// The people of a mass event.
@@ -255,6 +260,9 @@ pub(crate) fn scenario(
         operator,
         vehicles,
         services,
+        intruders: f
+            .get("intruders")
+            .map_or_else(|| Ok(Vec::new()), intruders::read)?,
         contour: f.get("contour").map(contour::read).transpose()?,
         crowd_there: f.get("crowd").map(crowd::read).transpose()?,
         findings,

@@ -67,6 +67,8 @@ pub struct Ending<'a> {
     pub now_ms: u64,
     /// What the world saw.
     pub judge: &'a Judge,
+    /// How near an aircraft that is no member came at most to a UAV at its height, metres.
+    pub nearest_intruder_m: Option<f64>,
     /// How often links that were up went down: by range, by sight, by fault.
     pub link_cuts: (u64, u64, u64),
     /// Rules that the run broke, where somebody checked them.
@@ -340,8 +342,17 @@ impl Account {
                 self.failures.push(text.clone());
                 Some(text)
             }
+            Fact::Intruded(i) if i.is_warned => {
+                let text = format!(
+                    "uav{} kept {:.1} m from intruder {}",
+                    i.uav, i.across_m, i.intruder
+                );
+                self.failures.push(text.clone());
+                Some(text)
+            }
             Fact::Seen { .. }
             | Fact::TooClose(_)
+            | Fact::Intruded(_)
             | Fact::TookOff { .. }
             | Fact::Lost { .. }
             | Fact::Failsafe { .. } => None,
@@ -467,6 +478,7 @@ impl Account {
             coverage,
             zone_entries: ending.judge.entries(),
             nearest_approach_m: ending.judge.closest().map(|a| a.distance_m),
+            nearest_intruder_m: ending.nearest_intruder_m,
             revisit_ms: ending.judge.longest_gap_ms(),
             revisit_late_ms: ending.judge.watched_gap_ms(now_ms / 2),
             kills: self.work.kills(&self.detection),

@@ -77,6 +77,10 @@ pub struct RunReport {
     pub zone_entries: usize,
     /// Smallest distance of two airborne UAVs, m (recorded, S1).
     pub nearest_approach_m: Option<f64>,
+    /// How near an aircraft that is no member came at most to a UAV at its height, metres; none
+    /// where none did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nearest_intruder_m: Option<f64>,
     /// The longest time in which a cell was not seen again, ms, where everything is to be
     /// seen several times.
     pub revisit_ms: Option<u64>,

@@ -132,6 +132,9 @@ impl RunReport {
         if let Some(m) = self.nearest_approach_m {
             write!(f, "; closest approach of two UAVs {m:.1} m")?;
         }
+        if let Some(m) = self.nearest_intruder_m {
+            write!(f, ", of an intruder {m:.1} m")?;
+        }
         writeln!(f)?;
         if let Some(ms) = self.revisit_ms {
             write!(f, "  revisit    {:.1} s at most", secs(ms))?;

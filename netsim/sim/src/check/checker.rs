@@ -18,6 +18,7 @@ use crate::fault::Fault;
 use crate::spec::Spec;
 use crate::world::Approach;
 use crate::world::contour::Contour;
+use crate::world::fact::Intrusion;
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
@@ -380,6 +381,11 @@ impl Checker {
     /// Two UAVs that keep apart by agreement came too close (S1).
     pub fn on_too_close(&mut self, approach: &Approach) {
         ProgressCheck::on_too_close(approach, &mut self.found);
+    }
+
+    /// An aircraft that is no member came too near, though there was time to make way (S13).
+    pub fn on_intrusion(&mut self, intrusion: &Intrusion) {
+        ProgressCheck::on_intrusion(intrusion, &mut self.found);
     }
 
     /// A UAV flew into a zone.

@@ -4,6 +4,7 @@
 use super::membership::Membership;
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::world::Approach;
+use crate::world::fact::Intrusion;
 use skein_peer::wire::message::Order;
 use std::collections::BTreeMap;
 
@@ -67,6 +68,14 @@ impl ProgressCheck {
         } = *approach;
         found.broken("S1", at_ms, Some(a), || {
             format!("came within {distance_m:.1} m of uav{b}")
+        });
+    }
+
+    /// An aircraft that is no member came too near.
+    pub fn on_intrusion(intrusion: &Intrusion, found: &mut Findings) {
+        let i = *intrusion;
+        found.broken("S13", i.at_ms, Some(i.uav), || {
+            format!("kept {:.1} m from intruder {}", i.across_m, i.intruder)
         });
     }
 

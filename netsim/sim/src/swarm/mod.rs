@@ -480,6 +480,9 @@ impl Swarm {
                 Fact::TooClose(approach) if self.is_judged(&approach) => {
                     self.checker.on_too_close(&approach);
                 }
+                Fact::Intruded(intrusion) if intrusion.is_warned => {
+                    self.checker.on_intrusion(&intrusion);
+                }
                 _ => {}
             }
         }

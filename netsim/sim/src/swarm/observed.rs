@@ -76,7 +76,7 @@ impl Swarm {
                 self.history
                     .keep(at_ms, || What::Failsafe { peer: uav, on });
             }
-            Fact::Seen { .. } | Fact::TooClose(_) | Fact::Lost { .. } => {}
+            Fact::Seen { .. } | Fact::TooClose(_) | Fact::Intruded(_) | Fact::Lost { .. } => {}
         }
     }
 }

@@ -83,6 +83,7 @@ impl Swarm {
         let report = self.account.conclude(Ending {
             now_ms: self.now_ms,
             judge: self.air.judge(),
+            nearest_intruder_m: self.air.world().intruders().nearest_m(),
             link_cuts: self.air.link_cuts(),
             violations: Some(Violations {
                 counts: found

@@ -17,6 +17,21 @@ pub struct Approach {
     pub distance_m: f64,
 }
 
+/// An aircraft that is no member came nearer to a UAV than is to be kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intrusion {
+    /// When, milliseconds.
+    pub at_ms: u64,
+    /// To whom.
+    pub uav: u16,
+    /// Which intruder, by its place in the scenario.
+    pub intruder: usize,
+    /// Distance across, metres.
+    pub across_m: f64,
+    /// Whether there was time to make way for it.
+    pub is_warned: bool,
+}
+
 /// Something that truly happened.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fact {
@@ -42,6 +57,8 @@ pub enum Fact {
     },
     /// Two airborne UAVs came closer than the least separation.
     TooClose(Approach),
+    /// An aircraft that is no member came too near.
+    Intruded(Intrusion),
     /// An airframe is gone.
     Lost {
         /// When, milliseconds.

@@ -141,6 +141,7 @@ pub fn square(n_uavs: u16) -> Spec {
         traffic_range_m: 0.0,
         vehicles: Vec::new(),
         services: Vec::new(),
+        intruders: Vec::new(),
         contour: None,
         crowd: None,
         faults: Vec::new(),

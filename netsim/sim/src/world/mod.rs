@@ -13,6 +13,7 @@ pub mod fact;
 pub mod fixture;
 pub mod flat;
 pub mod ground;
+pub mod intruders;
 pub mod judge;
 mod launcher;
 mod layers;
@@ -41,6 +42,7 @@ use crate::weather::Weather;
 use contour::Contour;
 use crowd::Crowd;
 use ground::Ground;
+use intruders::Intruders;
 use launcher::Launchers;
 use motion::{Kinematic, Piece};
 use services::Services;
@@ -172,6 +174,7 @@ pub struct World {
     judge: Judge,
     vehicles: Vehicles,
     services: Services,
+    intruders: Intruders,
     weather: Weather,
     launchers: Option<Launchers>,
     contour: Option<Contour>,
@@ -256,6 +259,7 @@ impl World {
             judge,
             vehicles: Vehicles::new(&spec.vehicles, seed),
             services: Services::new(&spec.services),
+            intruders: Intruders::new(&spec.intruders, seed),
             weather: spec.wind.clone(),
             launchers,
             contour: spec.contour.as_ref().map(|c| Contour::new(c, seed)),
@@ -461,7 +465,13 @@ impl World {
             time_ms: self.now_ms,
             takes_off_in_ms: u32::try_from(ground_ms).unwrap_or(u32::MAX),
             launch_ready: self.launchers.as_ref().is_some_and(|l| l.is_ready(uav)),
-            traffic: self.traffic(uav, body.position()),
+            traffic: self
+                .traffic(uav, body.position())
+                .with_aircraft(self.intruders.sensed(
+                    self.now_ms,
+                    body.position(),
+                    self.traffic_range_m,
+                )),
             sightings: self
                 .vehicles
                 .look(body, uav, self.now_ms, &self.site.obstacles),
@@ -527,6 +537,12 @@ impl World {
     #[must_use]
     pub fn services(&self) -> &Services {
         &self.services
+    }
+
+    /// Aircraft that are no members.
+    #[must_use]
+    pub fn intruders(&self) -> &Intruders {
+        &self.intruders
     }
 
     /// The ground station calls services on the ground to these; gives those of them that are
@@ -659,6 +675,9 @@ impl World {
             }
             self.flown.clear();
             u.body.advance(to_ms, &mut self.flown);
+            if u.body.failsafe() || u.body.takes_off_in_ms(to_ms) > 0 {
+                self.intruders.is_bound(u.id, to_ms);
+            }
             if self.flown.is_empty() && u.body.takes_off_in_ms(to_ms) == 0 {
                 // It takes off at this instant, and its camera shows what is below already.
                 self.flown.push(Piece::at(u.body.pose(), to_ms));
@@ -697,6 +716,8 @@ impl World {
             self.min_separation_m,
             &mut self.facts,
         );
+        self.intruders
+            .observe(to_ms, &self.airborne, &mut self.facts);
     }
 }
 

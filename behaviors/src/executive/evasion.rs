@@ -1,0 +1,189 @@
+//! Making way for aircraft that are no members (D2.7 §1.2.3, executive layer).
+//!
+//! | event | what follows |
+//! |---|---|
+//! | what is flown next leads too near to an aircraft that flies straight on | an evasion, from percept to percept |
+//! | the way to where it was to be is clear again | a new track to the cell that it was in, or whatever else was to be flown |
+//! | UAVs keep apart by agreement | what was promised is flown |
+//!
+//! How to evade is told by [`well_clear`](crate::reactive::well_clear). Cells that it left are flown anew, as after any silence; what the camera sees meanwhile counts.
+
+use super::{Executive, Played};
+use crate::percept::Percept;
+use crate::reactive::well_clear::Flight;
+use crate::setpoint::Setpoint;
+use crate::traffic::Aircraft;
+use skein_geometry::frame::{Point, Vector};
+
+impl Executive {
+    /// Whether it makes way for an aircraft that is no member.
+    #[must_use]
+    pub fn evades(&self) -> bool {
+        self.well_clear.evades()
+    }
+
+    /// The setpoint of an evasion, where one has to be flown.
+    pub(super) fn evade(&mut self, percept: &Percept) -> Option<Setpoint> {
+        let aircraft: Vec<Aircraft> = percept.traffic.aircraft().copied().collect();
+        if aircraft.is_empty() && !self.well_clear.evades() {
+            return None;
+        }
+        let airspeed_mps = self.speed_mps();
+        let wind_mps = Vector::new(percept.wind_east_mps, percept.wind_north_mps);
+        let own = Flight {
+            pose: percept.pose,
+            height_m: percept.height_m,
+            airspeed_mps,
+            limit_radps: self.transit.airframe.max_turn_rate_radps(airspeed_mps),
+            wind_mps,
+        };
+        let evaded = self.well_clear.evades();
+        let router = &self.transit.router;
+        let (zones, least_m) = (router.zones(), router.limits().clearance_m);
+        let track = &self.track;
+        let ground_mps = (self.flown_air().over_ground(percept.pose).direction() * airspeed_mps
+            + wind_mps)
+            .norm();
+        let begin = track.pose();
+        let wanted = |after_s: f64| -> Point {
+            let along_m = ground_mps * after_s;
+            let until_m = (track.at_m() + along_m).min(track.end_m());
+            match begin.and_then(|_| track.pose_at(until_m)) {
+                // Beyond what is planned so far straight on.
+                Some(pose) => {
+                    let beyond_m = track.at_m() + along_m - until_m;
+                    pose.position() + pose.direction() * beyond_m
+                }
+                None => percept.pose.position() + percept.pose.direction() * along_m,
+            }
+        };
+        let is_free = |at: Point| zones.zones().is_empty() || zones.distance_m(at) >= least_m;
+        let steers = self.well_clear.steer(&own, &aircraft, wanted, is_free);
+        // What was planned is left: expectations are those of a plan from here.
+        if evaded || steers.is_some() {
+            self.replan = true;
+            self.requeue();
+        }
+        let steps = steers?;
+        let setpoint = self.setpoint(percept, steps);
+        let setpoint = self.envelope.check(percept, setpoint);
+        self.played = Some(Played {
+            percept: *percept,
+            steps: setpoint.steps.clone(),
+            airspeed_mps: setpoint.airspeed_mps,
+            gimbal: Vec::new(),
+        });
+        Some(setpoint)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::executive::{Executive, Goal};
+    use crate::testing::{Wing, airframe, loop_and_router, square};
+    use crate::traffic::{Aircraft, Traffic};
+    use crate::{Event, Percept};
+    use skein_flight::coverage::ring::Direction;
+    use skein_flight::coverage::ring::backtracking::Leg;
+    use skein_geometry::frame::{Point, Pose, Vector};
+    use skein_geometry::math::{TAU, sin_cos};
+    use skein_geometry::random::SplitMix64;
+    use std::collections::BTreeSet;
+
+    #[allow(clippy::cast_possible_truncation, reason = "some kilometres")]
+    fn aircraft(at: Point, v: Vector, height_m: f64) -> Aircraft {
+        let dm = |m: f64| (10.0 * m).round() as i32;
+        Aircraft {
+            east_dm: dm(at.x),
+            north_dm: dm(at.y),
+            height_dm: dm(height_m),
+            east_dmps: (10.0 * v.x).round() as i16,
+            north_dmps: (10.0 * v.y).round() as i16,
+        }
+    }
+
+    /// Flies over an area while aircraft come straight at the UAV, one a minute, from any side;
+    /// how near they came, how long it evaded, and how many cells were not seen.
+    fn flies(seed: u64, (height_m, zoned, senses): (f64, bool, bool)) -> (f64, u32, usize) {
+        let zones = if zoned {
+            vec![square(240.0, 140.0, 60.0)]
+        } else {
+            Vec::new()
+        };
+        let (coverage_loop, router) = loop_and_router(12, 10, zones);
+        let n = coverage_loop.len();
+        let mut executive = Executive::new(airframe(), 90.0, coverage_loop, router);
+        let legs = vec![Leg {
+            first: 0,
+            count: u16::try_from(n).unwrap(),
+            direction: Direction::Forward,
+        }];
+        let mut open: BTreeSet<u16> = (0..u16::try_from(n).unwrap()).collect();
+        executive.set_goal(Goal::Legs(legs), &|cell| open.contains(&cell));
+        let mut wing = Wing::new(Pose::new(Point::new(-30.0, -30.0), 0.3));
+        let mut random = SplitMix64::new(seed);
+        let (mut at, mut v) = (Point::new(1e5, 1e5), Vector::zeros());
+        let (mut nearest_m, mut evaded) = (f64::INFINITY, 0);
+        for k in 0..12_000_u32 {
+            if k % 300 == 0 {
+                let (s, c) = sin_cos(TAU * random.unit());
+                v = Vector::new(c, s) * (15.0 + 25.0 * random.unit());
+                let meets_s = 25.0 + 10.0 * random.unit();
+                let there = wing.pose.position() + wing.pose.direction() * (13.0 * meets_s);
+                let there = if k % 600 == 0 {
+                    there
+                } else {
+                    wing.pose.position()
+                };
+                at = there - v * meets_s;
+            }
+            let sensed = senses.then(|| aircraft(at, v, height_m));
+            let percept = Percept {
+                traffic: Traffic::new(1_500.0, []).with_aircraft(sensed),
+                ..wing.percept()
+            };
+            let (setpoint, events) = executive.step(&percept, &|cell| open.contains(&cell));
+            for event in events {
+                if let Event::Seen(cells) | Event::Refused { cells } = event {
+                    open.retain(|cell| !cells.contains(cell));
+                }
+            }
+            evaded += u32::from(executive.evades());
+            wing.setpoint = Some(setpoint);
+            wing.fly(200);
+            at += v * 0.2;
+            nearest_m = nearest_m.min((wing.pose.position() - at).norm());
+            if open.is_empty() {
+                break;
+            }
+        }
+        (nearest_m, evaded, open.len())
+    }
+
+    #[test]
+    fn way_is_made_for_aircraft_from_any_side_and_all_is_seen() {
+        let mut evaded = 0;
+        for seed in 0..12 {
+            let (nearest_m, steps, left) = flies(seed, (95.0, seed % 2 == 1, true));
+            assert!(
+                nearest_m > 50.0 && left == 0,
+                "{seed}: {nearest_m} m, {left} left"
+            );
+            evaded += steps;
+        }
+        assert!(evaded > 500, "{evaded}");
+    }
+
+    #[test]
+    fn nobody_makes_way_for_what_passes_above_or_is_not_sensed() {
+        for (height_m, senses) in [(115.0, true), (95.0, false)] {
+            let flights = (0..6).map(|seed| flies(seed, (height_m, false, senses)));
+            let mut nearest_m = f64::INFINITY;
+            for (near_m, evaded, left) in flights {
+                assert_eq!((evaded, left), (0, 0));
+                nearest_m = nearest_m.min(near_m);
+            }
+            assert!(nearest_m < 50.0, "{nearest_m}");
+        }
+    }
+}
