@@ -22,6 +22,9 @@ use skein_geometry::random::{SplitMix64, mix};
 /// Missions from this seed on ask for more than coverage, tasks and targets.
 const MORE_FROM: u64 = 10_000;
 
+/// And from this one on nobody has the air for itself.
+const INTRUDERS_FROM: u64 = 20_000;
+
 /// So often something is mended before a draw is given up.
 const TRIES: usize = 60;
 
@@ -187,6 +190,7 @@ struct More {
     watched: Option<String>,
     people: Option<String>,
     separation: Option<&'static str>,
+    intruders: Option<String>,
 }
 
 impl Parts {
@@ -266,6 +270,9 @@ impl Parts {
         if seed >= MORE_FROM {
             parts.ask_for_more(r);
         }
+        if seed >= INTRUDERS_FROM && r.is(0.7) {
+            parts.more.intruders = Some(parts.intruders(r));
+        }
         parts
     }
 
@@ -324,6 +331,23 @@ impl Parts {
         }
     }
 
+    fn intruders(&self, r: &mut Random) -> String {
+        let (east_m, north_m) = (0.5 * self.size_m.0, 0.5 * self.size_m.1);
+        let cruise_mps = self.flyers[0].cruise_mps;
+        let one = |r: &mut Random| {
+            let height_m = self.level_m + 4.0 * r.between(0.0, self.uavs as f64);
+            format!(
+                "{{ at_s: {}, every_s: {}, speed_mps: {:.1}, height_m: {height_m:.1}, over: {{ east_m: {east_m:.1}, north_m: {north_m:.1}, radius_m: {:.1} }} }}",
+                r.whole(5, 60),
+                r.whole(60, 300),
+                cruise_mps * r.between(0.6, 3.5),
+                0.5 * (east_m + north_m),
+            )
+        };
+        let all: Vec<String> = (0..r.whole(1, 4)).map(|_| one(r)).collect();
+        format!("intruders: [{}]", all.join(", "))
+    }
+
     fn text(&self) -> String {
         let (mut asked, mut mission) = (format!("area: {}", self.area), Vec::new());
         match &self.asked {
@@ -362,7 +386,8 @@ impl Parts {
         if !mission.is_empty() {
             let _ = write!(more, "mission: {{ {} }},\n  ", mission.join(", "));
         }
-        for part in [&self.wind, &self.buildings].into_iter().flatten() {
+        let parts = [&self.wind, &self.buildings, &self.more.intruders];
+        for part in parts.into_iter().flatten() {
             let _ = write!(more, "{part},\n  ");
         }
         let [first, second] = &self.flyers;
@@ -425,6 +450,8 @@ impl Parts {
             (self.more.watched, self.more.people) = (None, None);
         } else if self.more.counts.is_some() && field.starts_with("mission") {
             self.more.counts = None;
+        } else if self.more.intruders.is_some() && field.starts_with("intruders") {
+            self.more.intruders = None;
         } else if self.more.separation.is_some()
             && (field.starts_with("fleet") || problem.contains("separation"))
         {
