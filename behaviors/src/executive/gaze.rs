@@ -23,7 +23,7 @@ impl Executive {
         let gaze = Gaze {
             gimbal,
             attitude,
-            track: (!self.is_pursuing()).then_some(&self.track),
+            track: (!self.is_pursuing() && !self.evades()).then_some(&self.track),
         };
         setpoint.gimbal = hold(&gaze, percept, &setpoint);
         if let Some(played) = &mut self.played {

@@ -29,7 +29,7 @@ pub const KEPT_M: f64 = 50.0;
 pub const KEPT_HEIGHT_M: f64 = 15.0;
 
 /// Whoever differs by less is looked at, metres: heights are held to some metres.
-const ABOUT_AS_HIGH_M: f64 = 1.5 * KEPT_HEIGHT_M;
+const ABOUT_AS_HIGH_M: f64 = KEPT_HEIGHT_M + 5.0;
 
 /// How far ahead is looked, seconds.
 pub const AHEAD_S: f64 = 20.0;
@@ -46,13 +46,18 @@ const CLEAR: f64 = 1.5;
 const ASKED: f64 = 1.6;
 
 /// Courses that are tried, in parts of a turn.
-const COURSES: i32 = 36;
+const COURSES: i32 = 72;
 
 /// A radian to the left counts as so many to the right: those who meet pass left to left.
 const LEFT_FACTOR: f64 = 1.5;
 
-/// A metre short of what is asked for costs as much as so many radians.
+/// A metre short of what is asked for costs as much as so many radians; and a metre short of what
+/// the wanted flight has to keep so many more, so that it is worth any deviation.
 const SHORT_RAD_PER_M: f64 = 0.1;
+const TOO_SHORT_RAD_PER_M: f64 = 2.0;
+
+/// What was begun is gone on with unless something else is so much cheaper, radians.
+const ANOTHER_RAD: f64 = 0.3;
 
 /// A way that leads into a zone costs as much as so many radians.
 const ZONE_RAD: f64 = 30.0;
@@ -78,20 +83,20 @@ pub struct Flight {
 /// What one UAV does about intruders.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WellClear {
-    /// Where it was to be, if it evades.
-    towards: Option<Point>,
+    /// If it evades: where it was to be, and on which heading it evades.
+    evasion: Option<(Point, Option<f64>)>,
 }
 
 impl WellClear {
     /// Whether it flies an evasion.
     #[must_use]
     pub fn evades(&self) -> bool {
-        self.towards.is_some()
+        self.evasion.is_some()
     }
 
     /// Nothing is evaded any more.
     pub fn end(&mut self) {
-        self.towards = None;
+        self.evasion = None;
     }
 
     /// The turns of an evasion; `None` where what is wanted may be flown. `wanted` tells where it
@@ -113,64 +118,85 @@ impl WellClear {
             })
             .collect();
         if near.is_empty() {
-            self.towards = None;
+            self.evasion = None;
             return None;
         }
-        let from = own.pose.position();
         let kept_m = |at: &dyn Fn(f64) -> Point| {
             let steps = (0..).map(|k| STEP_S * f64::from(k));
             let steps = steps.take_while(|t| *t <= AHEAD_S);
             steps.fold(f64::INFINITY, |least_m: f64, t| {
-                let own = at(t) - from;
+                let own = at(t) - own.pose.position();
                 let apart = near.iter().map(|(apart, v)| (apart + v * t - own).norm());
                 apart.fold(least_m, f64::min)
             })
         };
-        let goal = match self.towards {
+        let (goal, heading_rad) = match self.evasion {
             None => {
                 if kept_m(&wanted) >= ALERT * KEPT_M {
                     return None;
                 }
-                wanted(AHEAD_S)
+                (wanted(AHEAD_S), None)
             }
-            Some(goal) => {
+            Some((goal, heading_rad)) => {
                 let back = Course::new(own, goal);
                 if kept_m(&|t| back.at(t)) >= CLEAR * KEPT_M {
-                    self.towards = None;
+                    self.evasion = None;
                     return None;
                 }
-                goal
+                (goal, heading_rad)
             }
         };
-        self.towards = Some(goal);
-        let straight = Course::new(own, goal);
-        let mut best = (f64::INFINITY, straight);
-        for k in -COURSES / 2..=COURSES / 2 {
-            let beside_rad = TAU * f64::from(k) / f64::from(COURSES);
-            let deviation = if k > 0 {
-                LEFT_FACTOR * beside_rad
-            } else {
-                -beside_rad
-            };
-            if deviation >= best.0 {
-                continue;
-            }
-            let course = Course::of(own, straight.heading_rad + beside_rad);
-            let short_m = (ASKED * KEPT_M - kept_m(&|t| course.at(t))).max(0.0);
+        let price_rad = |course: &Course, deviation_rad: f64| {
+            let keeps_m = kept_m(&|t| course.at(t));
+            let short_m = |of: f64| (of * KEPT_M - keeps_m).max(0.0);
+            let short_rad = SHORT_RAD_PER_M * short_m(ASKED) + TOO_SHORT_RAD_PER_M * short_m(ALERT);
             let steps = (1..).map(|k| STEP_S * f64::from(k));
             let mut steps = steps.take_while(|t| *t <= ZONES_AHEAD_S);
-            let shut_rad = if steps.all(|t| is_free(course.at(t))) {
-                0.0
-            } else {
-                ZONE_RAD
-            };
-            let cost = deviation + SHORT_RAD_PER_M * short_m + shut_rad;
-            if cost < best.0 {
-                best = (cost, course);
-            }
-        }
-        Some(best.1.steers())
+            let is_clear = steps.all(|t| is_free(course.at(t)));
+            deviation_rad + short_rad + if is_clear { 0.0 } else { ZONE_RAD }
+        };
+        let course = cheapest(own, goal, heading_rad, price_rad);
+        self.evasion = Some((goal, Some(course.heading_rad)));
+        Some(course.steers())
     }
+}
+
+/// The cheapest course; what is begun already is cheaper than another by some.
+fn cheapest(
+    own: &Flight,
+    goal: Point,
+    begun_rad: Option<f64>,
+    price_rad: impl Fn(&Course, f64) -> f64,
+) -> Course {
+    let straight = Course::new(own, goal);
+    let deviation_rad = |beside_rad: f64| {
+        if beside_rad > 0.0 {
+            LEFT_FACTOR * beside_rad
+        } else {
+            -beside_rad
+        }
+    };
+    let mut best = (f64::INFINITY, straight);
+    if let Some(heading_rad) = begun_rad {
+        let course = Course::of(own, heading_rad);
+        let beside_rad = wrap_pi(heading_rad - straight.heading_rad);
+        best = (
+            price_rad(&course, deviation_rad(beside_rad)) - ANOTHER_RAD,
+            course,
+        );
+    }
+    for k in -COURSES / 2..=COURSES / 2 {
+        let beside_rad = TAU * f64::from(k) / f64::from(COURSES);
+        if deviation_rad(beside_rad) >= best.0 {
+            continue;
+        }
+        let course = Course::of(own, straight.heading_rad + beside_rad);
+        let price = price_rad(&course, deviation_rad(beside_rad));
+        if price < best.0 {
+            best = (price, course);
+        }
+    }
+    best.1
 }
 
 /// How far aircraft have to be sensed for a UAV to keep clear of one that flies straight at it,

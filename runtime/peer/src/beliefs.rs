@@ -65,6 +65,8 @@ pub struct Beliefs {
     pub wind_mps: Option<(f64, f64)>,
     /// Whether its fuel is due: it flies home.
     pub is_fuel_due: bool,
+    /// Whether it makes way for an aircraft that is no member.
+    pub evades: bool,
     /// What it holds of tasks: which, in which revision, how far it is.
     pub tasks: Vec<(TaskId, u32, Progress)>,
     /// Whether it gave its section up to hold a relay position.

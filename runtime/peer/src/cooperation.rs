@@ -540,6 +540,7 @@ impl Cooperation {
         beliefs.unheard = state.company.present().unheard;
         beliefs.finished = state.finished;
         beliefs.relays = state.relay.is_some();
+        beliefs.evades = state.executive.as_ref().is_some_and(|e| e.evades());
         beliefs.traces = state.executive.as_ref().is_some_and(|e| e.is_tracing());
         beliefs.hears_nobody = state.astray;
         beliefs.cannot_fly_all = state.cannot_fly_all();

@@ -6,6 +6,10 @@
 //! |---|---|
 //! | somebody | one of them takes for the whole loop, slowed down, and [`JOIN_MS`] |
 //! | the same ones for so long that they may have spread, and all hear each other | that at cruise, shared evenly among them, times [`UNEVEN`], and [`LATE_MS`] |
+//!
+//! While one of them makes way for an aircraft that is no member no time passes, nor for as long
+//! after it, in which it comes back; and what is near it counts as flown over: it may come back to
+//! the loop beyond that.
 
 use super::flight::{Flyer, milliseconds};
 use super::{Findings, PeerSnapshot, Snapshot};
@@ -34,6 +38,9 @@ const SPREAD_LAPS: u64 = 2;
 /// Nearer to the middle of a piece of the loop than this beside half of it somebody flies over
 /// it, metres: what is flown in a second, and some.
 const NEAR_M: f64 = 25.0;
+
+/// Who makes way comes back to the loop within this, metres.
+const ASIDE_M: f64 = 400.0;
 
 /// A loop as far as it is watched.
 #[derive(Clone, Debug)]
@@ -78,6 +85,7 @@ pub struct WatchCheck {
     linked_ms: u64,
     /// When each piece was flown over last.
     seen_ms: Vec<u64>,
+    looked_ms: u64,
     told: bool,
 }
 
@@ -119,9 +127,15 @@ impl WatchCheck {
         if !rounders.iter().all(|a| linked(*a)) {
             self.linked_ms = now_ms;
         }
-        for at in all.iter().filter_map(|m| m.at) {
+        let since_ms = now_ms.saturating_sub(core::mem::replace(&mut self.looked_ms, now_ms));
+        if all.iter().any(|m| m.view.evades) {
+            let seen = self.seen_ms.iter_mut();
+            seen.for_each(|ms| *ms = now_ms.min(*ms + 2 * since_ms));
+        }
+        for (at, evades) in all.iter().filter_map(|m| Some((m.at?, m.view.evades))) {
+            let near_m = if evades { ASIDE_M } else { NEAR_M };
             for ((middle, far_m), seen_ms) in watched.pieces.iter().zip(&mut self.seen_ms) {
-                if (at - *middle).norm() <= far_m + NEAR_M {
+                if (at - *middle).norm() <= far_m + near_m {
                     *seen_ms = now_ms;
                 }
             }
