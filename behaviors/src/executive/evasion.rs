@@ -8,11 +8,12 @@
 //!
 //! How to evade is told by [`well_clear`](crate::reactive::well_clear). Cells that it left are flown anew, as after any silence; what the camera sees meanwhile counts.
 
-use super::{Executive, Played};
+use super::{Executive, Kind, Played};
 use crate::percept::Percept;
 use crate::reactive::well_clear::Flight;
 use crate::setpoint::Setpoint;
 use crate::traffic::Aircraft;
+use skein_geometry::Segment;
 use skein_geometry::frame::{Point, Vector};
 
 impl Executive {
@@ -44,15 +45,23 @@ impl Executive {
         let ground_mps = (self.flown_air().over_ground(percept.pose).direction() * airspeed_mps
             + wind_mps)
             .norm();
+        // Beyond what is planned so far it circles on, or flies straight on.
+        let curvature_per_m = match self.stretches.back().map(|s| s.kind) {
+            Some(Kind::Loiter(circle)) => circle.curvature_per_m,
+            _ => 0.0,
+        };
         let begin = track.pose();
         let wanted = |after_s: f64| -> Point {
             let along_m = ground_mps * after_s;
             let until_m = (track.at_m() + along_m).min(track.end_m());
             match begin.and_then(|_| track.pose_at(until_m)) {
-                // Beyond what is planned so far straight on.
-                Some(pose) => {
-                    let beyond_m = track.at_m() + along_m - until_m;
-                    pose.position() + pose.direction() * beyond_m
+                Some(start) => {
+                    let beyond = Segment {
+                        start,
+                        curvature_per_m,
+                        length_m: track.at_m() + along_m - until_m,
+                    };
+                    beyond.end().position()
                 }
                 None => percept.pose.position() + percept.pose.direction() * along_m,
             }

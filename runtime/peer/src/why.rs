@@ -290,6 +290,9 @@ pub struct Work {
     /// In which layer it flies, where its mission has some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layer: Option<LayerFlown>,
+    /// Whether it makes way for an aircraft that is no member.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub evades: bool,
     /// Whether it takes part in planning.
     pub able: bool,
     /// Its open cells that come next, in order of flight.
@@ -425,6 +428,7 @@ pub(crate) fn work(state: &MissionState, now: Time) -> Work {
         state_ms: state.stage.state_ms(now),
         does,
         layer: layer(state),
+        evades: state.executive.as_ref().is_some_and(Executive::evades),
         able: state.able(),
         next_cells: open.iter().copied().take(NEXT_CELLS).collect(),
         open_cells: open.len(),
@@ -523,6 +527,12 @@ impl Why {
         }
         if let Some(layer) = &work.layer {
             writeln!(f, "  layer     {layer}")?;
+        }
+        if work.evades {
+            writeln!(
+                f,
+                "  evades    an aircraft that is no member, from what it senses"
+            )?;
         }
         let (counter, hash) = (work.epoch.counter, work.epoch.hash);
         writeln!(f, "  epoch     {counter}.{hash:08x}")?;

@@ -7,9 +7,8 @@
 //! | somebody | one of them takes for the whole loop, slowed down, and [`JOIN_MS`] |
 //! | the same ones for so long that they may have spread, and all hear each other | that at cruise, shared evenly among them, times [`UNEVEN`], and [`LATE_MS`] |
 //!
-//! While one of them makes way for an aircraft that is no member no time passes, nor for as long
-//! after it, in which it comes back; and what is near it counts as flown over: it may come back to
-//! the loop beyond that.
+//! Where one of them makes way for an aircraft that is no member all begins anew: it may come back
+//! to the loop elsewhere, and they have to spread again.
 
 use super::flight::{Flyer, milliseconds};
 use super::{Findings, PeerSnapshot, Snapshot};
@@ -38,9 +37,6 @@ const SPREAD_LAPS: u64 = 2;
 /// Nearer to the middle of a piece of the loop than this beside half of it somebody flies over
 /// it, metres: what is flown in a second, and some.
 const NEAR_M: f64 = 25.0;
-
-/// Who makes way comes back to the loop within this, metres.
-const ASIDE_M: f64 = 400.0;
 
 /// A loop as far as it is watched.
 #[derive(Clone, Debug)]
@@ -85,7 +81,6 @@ pub struct WatchCheck {
     linked_ms: u64,
     /// When each piece was flown over last.
     seen_ms: Vec<u64>,
-    looked_ms: u64,
     told: bool,
 }
 
@@ -114,7 +109,8 @@ impl WatchCheck {
         let all: Vec<&PeerSnapshot> = uavs.filter(|m| flies_round(m)).collect();
         let rounders: BTreeSet<u16> = all.iter().map(|m| m.id).collect();
         let now_ms = snapshot.now_ms;
-        if (&rounders, snapshot.loop_hash) != (&self.rounders, self.loop_hash) {
+        let makes_way = all.iter().any(|m| m.view.evades);
+        if makes_way || (&rounders, snapshot.loop_hash) != (&self.rounders, self.loop_hash) {
             self.rounders.clone_from(&rounders);
             self.loop_hash = snapshot.loop_hash;
             (self.since_ms, self.linked_ms) = (now_ms, now_ms);
@@ -127,15 +123,9 @@ impl WatchCheck {
         if !rounders.iter().all(|a| linked(*a)) {
             self.linked_ms = now_ms;
         }
-        let since_ms = now_ms.saturating_sub(core::mem::replace(&mut self.looked_ms, now_ms));
-        if all.iter().any(|m| m.view.evades) {
-            let seen = self.seen_ms.iter_mut();
-            seen.for_each(|ms| *ms = now_ms.min(*ms + 2 * since_ms));
-        }
-        for (at, evades) in all.iter().filter_map(|m| Some((m.at?, m.view.evades))) {
-            let near_m = if evades { ASIDE_M } else { NEAR_M };
+        for at in all.iter().filter_map(|m| m.at) {
             for ((middle, far_m), seen_ms) in watched.pieces.iter().zip(&mut self.seen_ms) {
-                if (at - *middle).norm() <= far_m + near_m {
+                if (at - *middle).norm() <= far_m + NEAR_M {
                     *seen_ms = now_ms;
                 }
             }

@@ -637,6 +637,7 @@ impl World {
             u.commander = number;
             let (uav, launch) = (u.id, u.body.pose());
             self.judge.forget_position(uav);
+            self.intruders.is_bound(uav, now_ms);
             if let Some(launchers) = &mut self.launchers {
                 launchers.join(uav, launch, now_ms);
                 launchers.hold(now_ms, &mut self.uavs, &mut self.facts);
