@@ -6,7 +6,8 @@
 //! | the way to where it was to be is clear again | a new track to the cell that it was in, or whatever else was to be flown |
 //! | UAVs keep apart by agreement | what was promised is flown |
 //!
-//! How to evade is told by [`well_clear`](crate::reactive::well_clear). Cells that it left are flown anew, as after any silence; what the camera sees meanwhile counts.
+//! How to evade is told by [`well_clear`](crate::reactive::well_clear). Cells that it left are flown
+//! anew, as after any silence; what the camera sees meanwhile counts.
 
 use super::{Executive, Kind, Played};
 use crate::percept::Percept;
@@ -41,30 +42,31 @@ impl Executive {
         let evaded = self.well_clear.evades();
         let router = &self.transit.router;
         let (zones, least_m) = (router.zones(), router.limits().clearance_m);
-        let track = &self.track;
-        let ground_mps = (self.flown_air().over_ground(percept.pose).direction() * airspeed_mps
-            + wind_mps)
-            .norm();
-        // Beyond what is planned so far it circles on, or flies straight on.
-        let curvature_per_m = match self.stretches.back().map(|s| s.kind) {
+        let track = Some(&self.track).filter(|_| !self.replan && !self.stretches.is_empty());
+        let ground_mps = (percept.pose.direction() * airspeed_mps + wind_mps).norm();
+        // Beyond what is planned so far it circles on, or flies straight on; where nothing is
+        // planned it turns on as it was told last.
+        let circles_per_m = match self.stretches.back().map(|s| s.kind) {
             Some(Kind::Loiter(circle)) => circle.curvature_per_m,
             _ => 0.0,
         };
-        let begin = track.pose();
+        let turns_radps = self.played.as_ref().and_then(|p| p.steps.last());
+        let turns_per_m = turns_radps.map_or(0.0, |s| s.turn_rate_radps) / airspeed_mps;
         let wanted = |after_s: f64| -> Point {
             let along_m = ground_mps * after_s;
-            let until_m = (track.at_m() + along_m).min(track.end_m());
-            match begin.and_then(|_| track.pose_at(until_m)) {
-                Some(start) => {
-                    let beyond = Segment {
-                        start,
-                        curvature_per_m,
-                        length_m: track.at_m() + along_m - until_m,
-                    };
-                    beyond.end().position()
-                }
-                None => percept.pose.position() + percept.pose.direction() * along_m,
-            }
+            let planned = track.and_then(|t| {
+                let until_m = (t.at_m() + along_m).min(t.end_m());
+                let left_m = t.at_m() + along_m - until_m;
+                Some((t.pose_at(until_m)?, circles_per_m, left_m))
+            });
+            let (start, curvature_per_m, length_m) =
+                planned.unwrap_or((percept.pose, turns_per_m, along_m));
+            let beyond = Segment {
+                start,
+                curvature_per_m,
+                length_m,
+            };
+            beyond.end().position()
         };
         let is_free = |at: Point| zones.zones().is_empty() || zones.distance_m(at) >= least_m;
         let steers = self.well_clear.steer(&own, &aircraft, wanted, is_free);
@@ -88,12 +90,14 @@ impl Executive {
 
 #[cfg(test)]
 mod tests {
+    use crate::executive::pursuit::Quarry;
     use crate::executive::{Executive, Goal};
     use crate::testing::{Wing, airframe, loop_and_router, square};
     use crate::traffic::{Aircraft, Traffic};
     use crate::{Event, Percept};
     use skein_flight::coverage::ring::Direction;
     use skein_flight::coverage::ring::backtracking::Leg;
+    use skein_flight::tracking::follower::TargetMotion;
     use skein_geometry::frame::{Point, Pose, Vector};
     use skein_geometry::math::{TAU, sin_cos};
     use skein_geometry::random::SplitMix64;
@@ -194,5 +198,48 @@ mod tests {
             }
             assert!(nearest_m < 50.0, "{nearest_m}");
         }
+    }
+
+    #[test]
+    fn who_follows_a_target_makes_way_and_follows_on() {
+        let (coverage_loop, router) = loop_and_router(12, 10, Vec::new());
+        let mut executive = Executive::new(airframe(), 90.0, coverage_loop, router);
+        executive.set_goal(Goal::Follow(60.0), &|_| false);
+        let target = Point::new(300.0, 250.0);
+        let mut wing = Wing::new(Pose::new(Point::new(240.0, 250.0), 1.6));
+        let mut random = SplitMix64::new(5);
+        let (mut at, mut v) = (Point::new(1e5, 1e5), Vector::zeros());
+        let (mut nearest_m, mut evaded) = (f64::INFINITY, 0);
+        for k in 0..6_000_u32 {
+            if k % 300 == 0 {
+                let (s, c) = sin_cos(TAU * random.unit());
+                v = Vector::new(c, s) * (15.0 + 25.0 * random.unit());
+                at = wing.pose.position() - v * (25.0 + 10.0 * random.unit());
+            }
+            let percept = Percept {
+                traffic: Traffic::new(1_500.0, []).with_aircraft([aircraft(at, v, 95.0)]),
+                ..wing.percept()
+            };
+            executive.pursue_at(Some(Quarry {
+                at_ms: percept.time_ms,
+                motion: TargetMotion {
+                    position: target,
+                    velocity_mps: Vector::zeros(),
+                    acceleration_mps2: Vector::zeros(),
+                },
+            }));
+            let (setpoint, _) = executive.step(&percept, &|_| false);
+            evaded += u32::from(executive.evades());
+            wing.setpoint = Some(setpoint);
+            wing.fly(200);
+            at += v * 0.2;
+            nearest_m = nearest_m.min((wing.pose.position() - at).norm());
+            if k % 300 == 299 {
+                let off_m = (wing.pose.position() - target).norm() - 60.0;
+                assert!(off_m.abs() < 15.0, "{off_m} m off its circle at step {k}");
+            }
+        }
+        assert!(nearest_m > 50.0, "{nearest_m}");
+        assert!(evaded > 100, "{evaded}");
     }
 }

@@ -94,11 +94,6 @@ impl WellClear {
         self.evasion.is_some()
     }
 
-    /// Nothing is evaded any more.
-    pub fn end(&mut self) {
-        self.evasion = None;
-    }
-
     /// The turns of an evasion; `None` where what is wanted may be flown. `wanted` tells where it
     /// would be after so many seconds, and `is_free` which places zones leave free.
     pub fn steer(
