@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | enough | what is left is no more than reserve and way home | due: the plan is given up, an alarm |
 //! | due | some was added, and enough may be spent from here | enough |
-//! | due | enough may be spent, and from the farthest open cell too (the reading was wrong, the wind dropped) | enough |
+//! | due | enough may be spent, and from the farthest open cell too (the reading was wrong, the wind dropped); with nothing open from anywhere on the loop | enough |
 //! | any | a plan that cannot be flown and returned from | it is cut, its end is orphaned |
 //!
 //! How long the way home takes is the executive's: [`skein_behaviors::executive::endurance`].
@@ -98,11 +98,20 @@ impl MissionState {
         let least_s = least_s.min(percept.endurance_s);
         let added_s = percept.endurance_s - least_s;
         let is_refuelled = added_s * 1000.0 >= f64::from(FUEL_BACK_MS);
-        let offered_ms = || self.offered_ms(Some(percept));
         let is_back = self.spendable_ms(Some(percept)) >= FUEL_BACK_MS
-            && (is_refuelled || offered_ms() >= FUEL_BACK_MS);
+            && (is_refuelled || self.farthest_ms(percept) >= FUEL_BACK_MS);
         self.fuel.due_s = (!is_back).then_some(least_s);
         Effects::new()
+    }
+
+    /// What may be flown wherever among the open cells it ends; with nothing open wherever on the
+    /// loop, milliseconds: on the way home that looks shorter than it did there.
+    fn farthest_ms(&self, percept: &Percept) -> u32 {
+        if !self.negotiation.sections.complete() {
+            return self.offered_ms(Some(percept));
+        }
+        let executive = self.executive.as_ref();
+        executive.map_or(0, |e| e.left_ms(percept).saturating_sub(e.home_ms()))
     }
 
     /// The fuel is due: the plan is given up.

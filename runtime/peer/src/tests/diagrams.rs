@@ -68,7 +68,7 @@ fn watching(mut diagram: Diagram) -> Diagram {
 }
 
 /// The default diagram of a mission that goes round once everything is seen, until a timer.
-fn rounds(after_s: u32) -> Diagram {
+pub(super) fn rounds(after_s: u32) -> Diagram {
     let over = (MissionEvent::Timer, after_s);
     let mut diagram = with("over", StateGoal::Home, Part::Ends, over);
     diagram

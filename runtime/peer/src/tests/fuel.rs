@@ -1,9 +1,11 @@
 //! Fuel that ends.
 
 use super::covered;
+use super::diagrams::rounds;
 use crate::Input;
 use crate::mission::{Mission, PointMm};
 use crate::output::Report;
+use crate::task::{CoverageTask, PointTask};
 use crate::testing::{Harness, mission};
 use crate::wire::codec::Body;
 use crate::wire::message::MissionStatus;
@@ -202,6 +204,40 @@ fn behind_a_wall_its_fuel_is_due_earlier() {
     let near = |away_m| away_m < 400.0;
     assert!(!is_due_at(&open, near, 70.0, (0.0, 0.0)));
     assert!(is_due_at(&walled, near, 70.0, (0.0, 0.0)));
+}
+
+/// On its way home it sees that the way is shorter than it feared on the loop, and has nothing to
+/// see: that is no reason to go round again.
+#[test]
+fn on_a_patrol_the_fuel_is_due_once() {
+    // Places far from each other: from one of them the next comes before the way home.
+    let place = |at: PointMm| PointTask {
+        at,
+        radius_mm: 20_000,
+    };
+    let places = [(0, 0), (1_200_000, 0), (1_200_000, 900_000), (0, 900_000)];
+    let patrol = Mission {
+        area: rectangle(-60_000, -60_000, 1_300_000, 1_000_000),
+        base: (600_000, -120_000),
+        zones: vec![rectangle(100_000, -60_000, 1_100_000, -50_000)],
+        task: CoverageTask::Points(places.map(place).to_vec()),
+        diagram: Some(Arc::new(rounds(3_000))),
+        ..mission(1, 8, 6)
+    };
+    let n = Arc::new(patrol.clone())
+        .geometry()
+        .unwrap()
+        .coverage_loop
+        .len();
+    let mut h = Harness::started(1, patrol);
+    assert!(h.run_until(900, |h| covered(h, 1) == n));
+    h.run_s(20);
+    h.seat(1).fuel_s = 60.0 + 300.0;
+    assert!(h.run_until(400, |h| h.beliefs(1).is_fuel_due));
+    h.run_s(100);
+    let due = h.alarms(1).into_iter().filter(|a| a == DUE).count();
+    assert_eq!(due, 1);
+    assert!(h.beliefs(1).is_fuel_due);
 }
 
 #[test]
