@@ -396,8 +396,7 @@ impl Executive {
         self.count_misses(is_open, &mut events);
         self.skip_closed(is_open);
         if self.replan || self.stretches.is_empty() {
-            self.replan = true;
-            self.requeue();
+            self.leave_track();
         }
         let start = self.start(percept, offset);
         self.lengthen(start, is_open, &mut events);
@@ -418,14 +417,24 @@ impl Executive {
         let setpoint = self.setpoint(percept, steps);
         let looks_s = self.lands_in_s().unwrap_or(HORIZON_S);
         let setpoint = self.envelope.check_until(percept, setpoint, looks_s);
-        let steps = setpoint.steps.clone();
+        self.plays(percept, &setpoint);
+        (setpoint, events)
+    }
+
+    /// This is commanded from a percept on; where its gimbal turns is not in it yet.
+    fn plays(&mut self, percept: &Percept, setpoint: &Setpoint) {
         self.played = Some(Played {
             percept: *percept,
-            steps,
+            steps: setpoint.steps.clone(),
             airspeed_mps: setpoint.airspeed_mps,
             gimbal: Vec::new(),
         });
-        (setpoint, events)
+    }
+
+    /// No track is kept: whatever comes next begins where the UAV is.
+    fn leave_track(&mut self) {
+        self.replan = true;
+        self.requeue();
     }
 
     /// Before it takes off: it sees nothing, and plans from where it stands once it flies.
@@ -434,8 +443,7 @@ impl Executive {
         let setpoint = if let Some(launch) = self.on_launcher(percept) {
             Setpoint { launch, ..bare }
         } else {
-            self.replan = true;
-            self.requeue();
+            self.leave_track();
             self.envelope.check(percept, bare)
         };
         self.played = Some(Played {

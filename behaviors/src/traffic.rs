@@ -8,6 +8,11 @@ use skein_geometry::frame::{Point, Vector};
 /// may be more.
 pub const TRAFFIC_MAX: usize = 16;
 
+/// Of decimetres.
+fn metres(dm: impl Into<f64>) -> f64 {
+    dm.into() / 10.0
+}
+
 /// One other UAV.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sighting {
@@ -26,16 +31,13 @@ impl Sighting {
     /// Where, in metres.
     #[must_use]
     pub fn at(&self) -> Point {
-        Point::new(
-            f64::from(self.east_dm) / 10.0,
-            f64::from(self.north_dm) / 10.0,
-        )
+        Point::new(metres(self.east_dm), metres(self.north_dm))
     }
 
     /// How high above the origin, in metres.
     #[must_use]
     pub fn height_m(&self) -> f64 {
-        f64::from(self.height_dm) / 10.0
+        metres(self.height_dm)
     }
 }
 
@@ -61,25 +63,19 @@ impl Aircraft {
     /// Where, in metres.
     #[must_use]
     pub fn at(&self) -> Point {
-        Point::new(
-            f64::from(self.east_dm) / 10.0,
-            f64::from(self.north_dm) / 10.0,
-        )
+        Point::new(metres(self.east_dm), metres(self.north_dm))
     }
 
     /// How high above the origin, in metres.
     #[must_use]
     pub fn height_m(&self) -> f64 {
-        f64::from(self.height_dm) / 10.0
+        metres(self.height_dm)
     }
 
     /// How fast over the ground, m/s.
     #[must_use]
     pub fn velocity_mps(&self) -> Vector {
-        Vector::new(
-            f64::from(self.east_dmps) / 10.0,
-            f64::from(self.north_dmps) / 10.0,
-        )
+        Vector::new(metres(self.east_dmps), metres(self.north_dmps))
     }
 }
 

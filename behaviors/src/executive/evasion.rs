@@ -9,7 +9,7 @@
 //! How to evade is told by [`well_clear`](crate::reactive::well_clear). Cells that it left are flown
 //! anew, as after any silence; what the camera sees meanwhile counts.
 
-use super::{Executive, Kind, Played};
+use super::{Executive, Kind};
 use crate::percept::Percept;
 use crate::reactive::well_clear::Flight;
 use crate::setpoint::Setpoint;
@@ -27,7 +27,8 @@ impl Executive {
     /// The setpoint of an evasion, where one has to be flown.
     pub(super) fn evade(&mut self, percept: &Percept) -> Option<Setpoint> {
         let aircraft: Vec<Aircraft> = percept.traffic.aircraft().copied().collect();
-        if aircraft.is_empty() && !self.well_clear.evades() {
+        let evaded = self.well_clear.evades();
+        if aircraft.is_empty() && !evaded {
             return None;
         }
         let airspeed_mps = self.speed_mps();
@@ -39,7 +40,6 @@ impl Executive {
             limit_radps: self.transit.airframe.max_turn_rate_radps(airspeed_mps),
             wind_mps,
         };
-        let evaded = self.well_clear.evades();
         let router = &self.transit.router;
         let (zones, least_m) = (router.zones(), router.limits().clearance_m);
         let track = Some(&self.track).filter(|_| !self.replan && !self.stretches.is_empty());
@@ -72,18 +72,11 @@ impl Executive {
         let steers = self.well_clear.steer(&own, &aircraft, wanted, is_free);
         // What was planned is left: expectations are those of a plan from here.
         if evaded || steers.is_some() {
-            self.replan = true;
-            self.requeue();
+            self.leave_track();
         }
-        let steps = steers?;
-        let setpoint = self.setpoint(percept, steps);
+        let setpoint = self.setpoint(percept, steers?);
         let setpoint = self.envelope.check(percept, setpoint);
-        self.played = Some(Played {
-            percept: *percept,
-            steps: setpoint.steps.clone(),
-            airspeed_mps: setpoint.airspeed_mps,
-            gimbal: Vec::new(),
-        });
+        self.plays(percept, &setpoint);
         Some(setpoint)
     }
 }

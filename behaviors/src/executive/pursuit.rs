@@ -18,7 +18,6 @@
 
 use super::transit::Transit;
 use super::{Aim, Executive};
-use crate::executive::camera::Played;
 use crate::percept::Percept;
 use crate::reactive::follow::HORIZON_S;
 use crate::setpoint::{MAX_STEPS, Setpoint, Steer};
@@ -192,15 +191,9 @@ impl Executive {
             ..self.setpoint(percept, steps(&commands))
         };
         // Nothing of a track is left: whatever comes next begins where the UAV is.
-        self.replan = true;
-        self.requeue();
+        self.leave_track();
         let setpoint = self.envelope.check(percept, setpoint);
-        self.played = Some(Played {
-            percept: *percept,
-            steps: setpoint.steps.clone(),
-            airspeed_mps: setpoint.airspeed_mps,
-            gimbal: Vec::new(),
-        });
+        self.plays(percept, &setpoint);
         Some(setpoint)
     }
 }

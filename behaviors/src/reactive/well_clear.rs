@@ -84,7 +84,7 @@ pub struct Flight {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WellClear {
     /// If it evades: where it was to be, and on which heading it evades.
-    evasion: Option<(Point, Option<f64>)>,
+    evasion: Option<(Point, f64)>,
 }
 
 impl WellClear {
@@ -125,20 +125,20 @@ impl WellClear {
                 apart.fold(least_m, f64::min)
             })
         };
-        let (goal, heading_rad) = match self.evasion {
+        let (goal, begun_rad) = match self.evasion {
             None => {
                 if kept_m(&wanted) >= ALERT * KEPT_M {
                     return None;
                 }
                 (wanted(AHEAD_S), None)
             }
-            Some((goal, heading_rad)) => {
+            Some((goal, begun_rad)) => {
                 let back = Course::new(own, goal);
                 if kept_m(&|t| back.at(t)) >= CLEAR * KEPT_M {
                     self.evasion = None;
                     return None;
                 }
-                (goal, heading_rad)
+                (goal, Some(begun_rad))
             }
         };
         let price_rad = |course: &Course, deviation_rad: f64| {
@@ -150,8 +150,8 @@ impl WellClear {
             let is_clear = steps.all(|t| is_free(course.at(t)));
             deviation_rad + short_rad + if is_clear { 0.0 } else { ZONE_RAD }
         };
-        let course = cheapest(own, goal, heading_rad, price_rad);
-        self.evasion = Some((goal, Some(course.heading_rad)));
+        let course = cheapest(own, goal, begun_rad, price_rad);
+        self.evasion = Some((goal, course.heading_rad));
         Some(course.steers())
     }
 }
