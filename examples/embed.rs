@@ -7,6 +7,7 @@
 //! their places; [`Peer`] tells nothing of its neighbours but through [`Output::Publish`], and
 //! learns nothing but through [`Input`].
 
+use skein_behaviors::obstacle::Obstacles;
 use skein_behaviors::reactive::follow::fly;
 use skein_behaviors::sightings::Sightings;
 use skein_behaviors::traffic::Traffic;
@@ -72,6 +73,8 @@ fn mission() -> Mission {
         lap: 0,
         further_laps: 0,
         added_zones: BTreeMap::new(),
+        dismissed: Default::default(),
+        finds_obstacles: false,
         sortie: 0,
         cancelled: false,
         diagram: None,
@@ -159,6 +162,7 @@ impl Uav {
             failsafe: false,
             circles_per_m: None,
             traffic: Traffic::default(),
+            obstacles: Obstacles::default(),
             sightings: Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
             crowd: skein_behaviors::crowd::CrowdLook::default(),

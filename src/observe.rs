@@ -7,6 +7,7 @@ use skein_node::bus::{Observed, Observer};
 use skein_peer::PeerId;
 use skein_peer::wire::codec::{Body, open};
 use skein_peer::wire::message::{ListedRun, Record};
+use skein_peer::wire::obstacle::Found;
 use skein_peer::wire::signature::Off;
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -199,6 +200,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Count(b) => serde_json::to_value(b),
         Body::Usage(b) => serde_json::to_value(b),
         Body::Crowd(b) => serde_json::to_value(b),
+        Body::Obstacles(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -320,6 +322,18 @@ fn words(author: u16, body: &Body) -> String {
             t.dense.len(),
             t.time_s
         ),
+        Body::Obstacles(o) => {
+            let one = |f: &Found| {
+                let o = f.obstacle();
+                format!("({:.1}, {:.1}) m", o.at().x, o.at().y)
+            };
+            let places: Vec<String> = o.found.iter().map(one).collect();
+            format!(
+                "knows of {} obstacles that are on no map: {}",
+                o.found.len(),
+                places.join(", ")
+            )
+        }
         Body::Trail(t) => format!(
             "tells {} places of a contour, the first seen at {} ms of the clock of percepts",
             t.places.len(),

@@ -21,6 +21,7 @@ pub mod contour;
 pub mod crowd;
 pub mod event;
 pub mod executive;
+pub mod obstacle;
 pub mod order;
 pub mod percept;
 pub mod reactive;

@@ -3,6 +3,7 @@
 use crate::attitude::Attitude;
 use crate::contour::ContourLook;
 use crate::crowd::CrowdLook;
+use crate::obstacle::Obstacles;
 use crate::sightings::Sightings;
 use crate::traffic::Traffic;
 use serde::{Deserialize, Serialize};
@@ -45,6 +46,9 @@ pub struct Percept {
     /// Other UAVs that it senses.
     #[serde(default, skip_serializing_if = "Traffic::is_absent")]
     pub traffic: Traffic,
+    /// What it senses that stands in its way and may be on no map.
+    #[serde(default, skip_serializing_if = "Obstacles::is_absent")]
+    pub obstacles: Obstacles,
     /// Vehicles that its camera sees.
     #[serde(default, skip_serializing_if = "Sightings::is_absent")]
     pub sightings: Sightings,

@@ -49,6 +49,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         failsafe: false,
         circles_per_m: None,
         traffic: crate::traffic::Traffic::default(),
+        obstacles: crate::obstacle::Obstacles::default(),
         sightings: crate::sightings::Sightings::default(),
         contour: crate::contour::ContourLook::default(),
         crowd: crate::crowd::CrowdLook::default(),

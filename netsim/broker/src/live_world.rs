@@ -8,6 +8,7 @@ use skein_netsim::radio::{LinkTable, Overlay};
 use skein_netsim::spec::Spec;
 use skein_netsim::witnessed::AskedLook;
 use skein_netsim::world::intruders::Intruders;
+use skein_netsim::world::unmapped::Unmapped;
 use skein_netsim::world::{Fact, Judge, Site, Survey, World};
 use skein_peer::Call;
 use skein_peer::offload::MissionGeometry;
@@ -158,6 +159,12 @@ impl LiveWorld {
     #[must_use]
     pub fn intruders(&self) -> &Intruders {
         self.world.intruders()
+    }
+
+    /// Obstacles that are on no map.
+    #[must_use]
+    pub fn unmapped(&self) -> &Unmapped {
+        self.world.unmapped()
     }
 
     /// What was seen and what went wrong.

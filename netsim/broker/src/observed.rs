@@ -95,7 +95,11 @@ impl Observed {
             Fact::Lost { uav, cause, .. } if cause != Loss::Killed => o.lost(now_ms, uav),
             Fact::TookOff { uav, .. } => o.took_off(now_ms, uav),
             Fact::Failsafe { uav, on, .. } => o.failsafe(now_ms, uav, on),
-            Fact::Lost { .. } | Fact::Seen { .. } | Fact::TooClose(_) | Fact::Intruded(_) => {}
+            Fact::Lost { .. }
+            | Fact::Seen { .. }
+            | Fact::TooClose(_)
+            | Fact::Intruded(_)
+            | Fact::Collided(_) => {}
         });
     }
 

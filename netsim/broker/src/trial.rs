@@ -389,7 +389,8 @@ impl<'a> Trial<'a> {
             Some(Said::Report { id, report }) => {
                 match &report {
                     Report::Ready { revision, .. } => self.world.follows(id, *revision),
-                    Report::Revised { mission } => self.revise(mission),
+                    Report::Revised { mission } => self.revise(mission, "the operator gives"),
+                    Report::Found { mission } => self.found(mission),
                     Report::Detected { id: task, told } if task.author == id => {
                         let at = (self.now_ms, id);
                         let truth = self.world.world().vehicles().truth();
@@ -426,9 +427,17 @@ impl<'a> Trial<'a> {
         }
     }
 
+    /// A peer knows of obstacles that are on no map.
+    fn found(&mut self, mission: &Arc<Mission>) {
+        let is_lap = || self.mission.later_lap(mission.revision).as_ref() == Some(&**mission);
+        if mission.revision > self.mission.revision && !is_lap() {
+            self.revise(mission, "obstacles are found:");
+        }
+    }
+
     /// The operator gave another mission: it is judged by from now on. Time stands still while
     /// its site is surveyed.
-    fn revise(&mut self, mission: &Arc<Mission>) {
+    fn revise(&mut self, mission: &Arc<Mission>, why: &str) {
         let surveyed = tokio::task::block_in_place(|| {
             let geometry = skein_netsim::geometry_of(mission).map_err(|e| e.to_string())?;
             let survey = Survey::of_mission(&self.spec, mission).map_err(|e| e.to_string())?;
@@ -453,7 +462,7 @@ impl<'a> Trial<'a> {
                 self.asked(&mission.brought(false));
                 // Whoever believed the last one finished has not begun this one.
                 self.all_finished_ms = None;
-                let mut text = format!("the operator gives revision {}", mission.revision);
+                let mut text = format!("{why} revision {}", mission.revision);
                 if left_out > 0 {
                     let _ = write!(
                         text,
@@ -748,6 +757,7 @@ impl<'a> Trial<'a> {
             now_ms: self.now_ms,
             judge: self.world.judge(),
             nearest_intruder_m: self.world.intruders().nearest_m(),
+            nearest_obstacle_m: self.world.unmapped().nearest_m(),
             link_cuts: self.world.link_cuts(),
             violations: None,
             details: Details::Live(Live {

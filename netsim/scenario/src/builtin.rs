@@ -22,6 +22,11 @@ const SCENARIOS: &[(&str, &str, &str)] = &[
         include_str!("../../../configs/trials/convoy.json5"),
     ),
     (
+        "cranes",
+        "cranes.json5",
+        include_str!("../../../configs/trials/cranes.json5"),
+    ),
+    (
         "crossings",
         "crossings.json5",
         include_str!("../../../configs/trials/crossings.json5"),

@@ -25,6 +25,9 @@ const MORE_FROM: u64 = 10_000;
 /// And from this one on nobody has the air for itself.
 const INTRUDERS_FROM: u64 = 20_000;
 
+/// And from this one on things stand there that are on no map.
+const OBSTACLES_FROM: u64 = 30_000;
+
 /// So often something is mended before a draw is given up.
 const TRIES: usize = 60;
 
@@ -191,6 +194,7 @@ struct More {
     people: Option<String>,
     separation: Option<&'static str>,
     intruders: Option<String>,
+    obstacles: Option<String>,
 }
 
 impl Parts {
@@ -273,6 +277,9 @@ impl Parts {
         if seed >= INTRUDERS_FROM && r.is(0.7) {
             parts.more.intruders = Some(parts.intruders(r));
         }
+        if seed >= OBSTACLES_FROM && r.is(0.8) {
+            parts.more.obstacles = Some(parts.obstacles(r));
+        }
         parts
     }
 
@@ -348,6 +355,19 @@ impl Parts {
         format!("intruders: [{}]", all.join(", "))
     }
 
+    fn obstacles(&self, r: &mut Random) -> String {
+        let (east_m, north_m) = (0.5 * self.size_m.0, 0.5 * self.size_m.1);
+        let one = |r: &mut Random| {
+            format!(
+                "{{ radius_m: {:.1}, within: {{ east_m: {east_m:.1}, north_m: {north_m:.1}, radius_m: {:.1} }} }}",
+                r.between(1.0, 40.0),
+                0.6 * (east_m + north_m),
+            )
+        };
+        let all: Vec<String> = (0..r.whole(1, 5)).map(|_| one(r)).collect();
+        format!("obstacles: [{}]", all.join(", "))
+    }
+
     fn text(&self) -> String {
         let (mut asked, mut mission) = (format!("area: {}", self.area), Vec::new());
         match &self.asked {
@@ -386,7 +406,8 @@ impl Parts {
         if !mission.is_empty() {
             let _ = write!(more, "mission: {{ {} }},\n  ", mission.join(", "));
         }
-        let parts = [&self.wind, &self.buildings, &self.more.intruders];
+        let (intruders, obstacles) = (&self.more.intruders, &self.more.obstacles);
+        let parts = [&self.wind, &self.buildings, intruders, obstacles];
         for part in parts.into_iter().flatten() {
             let _ = write!(more, "{part},\n  ");
         }
@@ -452,6 +473,8 @@ impl Parts {
             self.more.counts = None;
         } else if self.more.intruders.is_some() && field.starts_with("intruders") {
             self.more.intruders = None;
+        } else if self.more.obstacles.is_some() && field.starts_with("obstacles") {
+            self.more.obstacles = None;
         } else if self.more.separation.is_some()
             && (field.starts_with("fleet") || problem.contains("separation"))
         {

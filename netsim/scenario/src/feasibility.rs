@@ -80,6 +80,7 @@ pub(crate) fn blamed(e: &GeometryError) -> &'static str {
         GeometryError::Layers(_) => "mission.layers_m",
         GeometryError::Crowd(..) => "mission.crowd",
         GeometryError::Buildings(_) => "mission.buildings",
+        GeometryError::Laps => "laps",
         GeometryError::Zone(..) | GeometryError::AddedZone(..) | GeometryError::ZoneName => {
             "no_fly"
         }

@@ -51,6 +51,8 @@ mod intruded;
 mod mission;
 mod mounts;
 #[cfg(test)]
+mod obstructed;
+#[cfg(test)]
 mod operated;
 mod read;
 mod request;

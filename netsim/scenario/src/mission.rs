@@ -13,12 +13,15 @@ use skein_flight::trajectory::wind::Wind;
 use skein_geometry::frame::Point;
 use skein_geometry::{NoFlyZones, Polygon};
 use skein_interop::json::Error;
-use skein_netsim::world::intruders;
+use skein_netsim::spec::{ObstaclePlace, Spec};
+use skein_netsim::world::{intruders, unmapped};
 use skein_peer::diagram::DiagramError;
+use skein_peer::found_obstacles::MARGIN_DM;
 use skein_peer::mission::{mm, ring_mm};
+use skein_peer::wire::obstacle::Found;
 use skein_peer::wire::tasks::TaskKind;
 use skein_peer::{CoverageTask, Mission};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 #[allow(
@@ -81,6 +84,8 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
         further_laps: laps(s)? - 1,
         layers: layers::of_fleet(&s.layers_m, &s.fleet),
         added_zones: BTreeMap::new(),
+        dismissed: BTreeSet::new(),
+        finds_obstacles: finds_obstacles(s),
         sortie: 0,
         cancelled: false,
         diagram: s.diagram.clone().map(Arc::new),
@@ -103,6 +108,7 @@ pub(crate) fn mission(s: &Stated) -> Result<Mission, Error> {
     layers::check(s, &mission)?;
     check_separation(s, &mission)?;
     check_intruders(s)?;
+    check_obstacle_range(s, &mission)?;
     check_diagram(s, &mission)?;
     check_brought(s, &mission)?;
     check_size(s)?;
@@ -177,6 +183,95 @@ fn check_intruders(s: &Stated) -> Result<(), Error> {
         )),
         _ => Ok(()),
     }
+}
+
+/// Whether UAVs sense obstacles that are on no map.
+fn finds_obstacles(s: &Stated) -> bool {
+    !s.obstacles.is_empty() || s.fleet.obstacle_range_m.is_some_and(|m| m > 0.0)
+}
+
+/// How far they sense them, metres: what is stated, or what turning away asks for; 0 where nothing
+/// is to be sensed.
+pub(crate) fn obstacle_range_m(s: &Stated, mission: &Mission) -> f64 {
+    let least_m = || {
+        if s.obstacles.is_empty() {
+            0.0
+        } else {
+            least_range_to_obstacles_m(s, mission).ceil()
+        }
+    };
+    s.fleet.obstacle_range_m.unwrap_or_else(least_m)
+}
+
+/// How far obstacles have to be sensed for every UAV to turn away from them, metres.
+fn least_range_to_obstacles_m(s: &Stated, mission: &Mission) -> f64 {
+    let wind_mps = s.wind.strongest_held().speed_mps();
+    let of = |m: &Member| unmapped::least_range_m(&m.airframe, wind_mps, mission.clearance_m());
+    s.fleet.members.iter().map(of).fold(0.0, f64::max)
+}
+
+fn check_obstacle_range(s: &Stated, mission: &Mission) -> Result<(), Error> {
+    let least_m = least_range_to_obstacles_m(s, mission).ceil();
+    match s.fleet.obstacle_range_m {
+        Some(range_m) if finds_obstacles(s) && range_m < least_m => Err(s.places.wrong(
+            "fleet.obstacle_range_m",
+            format!(
+                "{range_m} m are too short to turn away from an obstacle on no map; expected at least {least_m} m"
+            ),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Obstacles at stated places stand where UAVs start and come home unhindered, and the mission can
+/// be flown round them.
+pub(crate) fn check_obstacles(s: &Stated, spec: &Spec) -> Result<(), Error> {
+    let mission = &spec.mission;
+    let room_m = mission.clearance_m() + 2.0 * mission.turn_radius_m();
+    let starts = spec.uavs.iter().filter(|u| u.twin_of.is_none());
+    let starts = starts.map(|u| {
+        (
+            format!("the launch place of uav{}", u.id),
+            u.launch.position(),
+        )
+    });
+    let kept: Vec<(String, Point)> = starts
+        .chain([("the base".to_owned(), mission.base_m())])
+        .collect();
+    let mut stated = BTreeSet::new();
+    for (n, obstacle) in s.obstacles.iter().enumerate() {
+        let ObstaclePlace::At(at) = obstacle.place else {
+            continue;
+        };
+        let field = format!("obstacles[{n}]");
+        for (what, place) in &kept {
+            let from_m = (place - at).norm() - obstacle.radius_m;
+            if from_m < room_m {
+                return Err(s.places.wrong(
+                    &field,
+                    format!(
+                        "its edge is {from_m:.1} m from {what}; expected at least {room_m:.1} m"
+                    ),
+                ));
+            }
+        }
+        stated.insert(Found {
+            again: 0,
+            east_dm: mm(at.x) / 100,
+            north_dm: mm(at.y) / 100,
+            radius_dm: u16::try_from(mm(obstacle.radius_m) / 100)
+                .unwrap_or(u16::MAX)
+                .saturating_add(MARGIN_DM),
+        });
+    }
+    let Some(round) = mission.with_found(&stated) else {
+        return Ok(());
+    };
+    let flown = Arc::new(round).geometry().map_err(|e| e.to_string());
+    flown.and_then(|g| g.base_is_clear()).map_err(|why| {
+        let text = format!("nobody can fly round all of them: {why}");
+        s.places.wrong("obstacles", text)
+    })
 }
 
 /// What flying at one height by agreement asks for.

@@ -6,8 +6,7 @@ use crate::error::{Finding, ScenarioError, Severity};
 use crate::feasibility::{self, Summary, blamed};
 use crate::files::Files;
 use crate::forecast::{self, Forecast};
-use crate::mission::mission;
-use crate::mission::traffic_range_m;
+use crate::mission::{check_obstacles, mission, obstacle_range_m, traffic_range_m};
 use crate::read::fleet::{Fleet, Member};
 use crate::read::targets::Asked;
 use crate::read::{self, Stated, layers, operator};
@@ -62,6 +61,7 @@ impl Scenario {
             geometry
         };
         let spec = spec(&stated, &geometry);
+        check_obstacles(&stated, &spec)?;
         let survey = Survey::new(&spec);
         let (found, summary) = feasibility::with_geometry(&spec, &geometry, &survey);
         let mut findings = stated.findings.clone();
@@ -150,6 +150,8 @@ fn spec(s: &Stated, geometry: &MissionGeometry) -> Spec {
         vehicles: s.vehicles.clone(),
         services: s.services.clone(),
         intruders: s.intruders.clone(),
+        obstacles: s.obstacles.clone(),
+        obstacle_range_m: obstacle_range_m(s, &geometry.mission),
         contour: s.contour.clone(),
         crowd: s.crowd_there.clone(),
         faults: with_operator(s),

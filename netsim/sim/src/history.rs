@@ -286,6 +286,7 @@ pub fn report_hash(report: &Report) -> u64 {
         Report::Revised { mission } => {
             words(&mut h, 11, &[mission.content_hash()]);
         }
+        Report::Found { mission } => words(&mut h, 17, &[mission.content_hash()]),
         Report::Silenced => words(&mut h, 10, &[]),
         Report::Task {
             id,

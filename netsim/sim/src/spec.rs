@@ -62,6 +62,10 @@ pub struct Spec {
     pub services: Vec<ServiceSpec>,
     /// Aircraft that are no members of the fleet and make way for nobody.
     pub intruders: Vec<IntruderSpec>,
+    /// Obstacles that no peer has on its map.
+    pub obstacles: Vec<ObstacleSpec>,
+    /// How far UAVs sense them, metres; 0 without such sensors.
+    pub obstacle_range_m: f64,
     /// A road or a fire that no peer knows, of which cameras see what is in their pictures.
     pub contour: Option<ContourSpec>,
     /// The people of a mass event, of whom cameras see those in their pictures.
@@ -195,6 +199,30 @@ pub enum IntruderWay {
     /// Each time straight on another course, drawn by the run's seed, over some place of this
     /// circle.
     Over {
+        /// Its middle.
+        middle: Point,
+        /// Its radius, metres.
+        radius_m: f64,
+    },
+}
+
+/// Something that stands through all heights and is on no map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObstacleSpec {
+    /// How far from its middle it reaches, metres.
+    pub radius_m: f64,
+    /// Where it stands.
+    pub place: ObstaclePlace,
+}
+
+/// Where an obstacle stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ObstaclePlace {
+    /// There.
+    At(Point),
+    /// Somewhere in this circle, drawn by the run's seed, away from where UAVs start and come home,
+    /// from zones, and from others.
+    Within {
         /// Its middle.
         middle: Point,
         /// Its radius, metres.

@@ -117,6 +117,12 @@ fn reported(peer: u16, report: &Report, told: &mut BTreeSet<String>) -> Option<S
         Report::Revised { mission } => {
             format!("peer {peer} was given revision {}", mission.revision)
         }
+        Report::Found { mission } => {
+            format!(
+                "peer {peer} {}",
+                skein_peer::found_obstacles::sentence(mission)
+            )
+        }
         Report::Membership { .. } | Report::Covered { .. } => return None,
     };
     Some(line)

@@ -299,6 +299,11 @@ impl Observer {
                 let text = format!("the operator gives revision {revision}");
                 (What::Revised { revision }, text)
             }
+            Report::Found { mission } => {
+                let revision = mission.revision;
+                let text = format!("{who} {}", skein_peer::found_obstacles::sentence(mission));
+                (What::Revised { revision }, text)
+            }
             Report::Task { name, news, .. } => {
                 let text = format!("{who}: {}", news.sentence(name));
                 (task_news(report), text)

@@ -16,6 +16,7 @@ use skein_peer::offload::MissionGeometry;
 use skein_peer::wire::codec::{Body, open};
 use skein_peer::wire::key;
 use skein_peer::wire::message::{Bid, CellRun, Claim, Cover, ListedRun, MissionChunk};
+use skein_peer::wire::obstacle::{FOUND_MAX, Found};
 use skein_peer::wire::signature::Off;
 use skein_recording::cells::{Cell, Cells};
 use skein_recording::model::event::{Bid as ToldBid, Event, Origin, What};
@@ -40,6 +41,8 @@ pub struct Belief {
     /// None until somebody was heard, where it is not known from elsewhere.
     fleet: Option<String>,
     library: Library,
+    /// Obstacles on no map that peers tell of.
+    found: BTreeSet<Found>,
     geometry: Option<Arc<MissionGeometry>>,
     scene: Scene,
     peers: BTreeMap<u16, Peer>,
@@ -60,6 +63,7 @@ impl Belief {
         Self {
             fleet: fleet.map(str::to_owned),
             library: Library::default(),
+            found: BTreeSet::new(),
             geometry: None,
             scene: Scene::default(),
             peers: BTreeMap::new(),
@@ -139,6 +143,13 @@ impl Belief {
             Body::Claim(claim) => self.claim(now_ms, id, claim),
             Body::Bid(bid) => self.bid(now_ms, id, bid),
             Body::Cover(cover) => self.cover(now_ms, id, cover),
+            Body::Obstacles(told) => {
+                self.found.extend(&told.found);
+                while self.found.len() > FOUND_MAX {
+                    self.found.pop_last();
+                }
+                self.follow(now_ms);
+            }
             Body::Mission(chunk) => self.piece(now_ms, subject, chunk),
             Body::Finished(finished) => {
                 let revision = finished.revision;
@@ -213,9 +224,10 @@ impl Belief {
 
     /// The newest mission is the one that is shown.
     fn follow(&mut self, now_ms: u64) {
-        let Some(mission) = self.library.newest() else {
+        let Some(given) = self.library.newest() else {
             return;
         };
+        let mission = given.with_found(&self.found).map_or(given, Arc::new);
         let shown = self.geometry.as_ref().map_or(0, |g| g.mission.revision);
         if self.geometry.is_some() && mission.revision <= shown {
             return;

@@ -39,6 +39,7 @@ use crate::beliefs::Beliefs;
 use crate::config::{PeerConfig, Role};
 use crate::effect::{Effect, Effects, PendingJob, Promise};
 use crate::errand::Planned;
+use crate::found_obstacles::KnownObstacles;
 use crate::input::Time;
 use crate::journal::Durable;
 use crate::library::Library;
@@ -98,6 +99,7 @@ pub(crate) struct Cooperation {
     state: Option<MissionState>,
     pub(crate) tasking: Tasking,
     pub(crate) trails: Trails,
+    obstacles: KnownObstacles,
     mismatch_told: bool,
     /// When a piece of a mission came last.
     piece_came: Time,
@@ -111,6 +113,7 @@ impl Cooperation {
             library: Library::new(config.mission.clone()),
             tasking: Tasking::new(config),
             trails: Trails::default(),
+            obstacles: KnownObstacles::default(),
             orders: StandingOrders::default(),
             state: None,
             mismatch_told: false,
@@ -178,6 +181,7 @@ impl Cooperation {
         }
         self.tasking.void_ownership(me, self.state.as_mut());
         self.trails.begin_life(me.incarnation);
+        self.obstacles.begin_life();
     }
 
     /// For so long this peer did not listen: it waits that much longer for others.
@@ -211,6 +215,40 @@ impl Cooperation {
         zones.into_iter().chain(self.consider_mission()).collect()
     }
 
+    /// What the UAV senses on no map is flown round by all, and kept clear of by itself meanwhile.
+    fn sense_obstacles(&mut self, percept: &Percept) -> Effects {
+        let newest = self.library.newest();
+        let Some(newest) = newest.filter(|_| !percept.obstacles.is_absent()) else {
+            return Effects::new();
+        };
+        let is_news = self.obstacles.sense(&percept.obstacles, &newest);
+        let mut effects = if is_news {
+            self.fly_round_found()
+        } else {
+            Effects::new()
+        };
+        let newest = self.library.newest().unwrap_or(newest);
+        let unmapped = self.obstacles.unmapped(&percept.obstacles, &newest);
+        if let (Some(unmapped), Some(state)) = (unmapped, &mut self.state) {
+            effects.extend(state.heed_obstacles(&newest, &unmapped));
+        }
+        effects
+    }
+
+    /// The newest mission with zones round all that is known, if it lacks any.
+    fn fly_round_found(&mut self) -> Effects {
+        let known = self.obstacles.known();
+        let newest = self.library.newest().filter(|_| !known.is_empty());
+        let Some(next) = newest.and_then(|newest| newest.with_found(known)) else {
+            return Effects::new();
+        };
+        let mission = Arc::new(next);
+        self.library.offer(Arc::clone(&mission));
+        let mut effects = vec![Effect::Report(Report::Found { mission })];
+        effects.extend(self.mission_is_whole());
+        effects
+    }
+
     /// The geometry of the mission with this hash arrived: from now on it is the mission.
     pub fn geometry_arrived(
         &mut self,
@@ -230,6 +268,7 @@ impl Cooperation {
             }
         };
         let old = self.state.take();
+        self.obstacles.heed_anew();
         let state = MissionState::begun(geometry, old, me, config, durable, timers);
         let ready = Report::Ready {
             revision: state.revision(),
@@ -251,20 +290,20 @@ impl Cooperation {
 
     /// A percept: fly, and note what the camera saw.
     pub fn on_percept(&mut self, now: Time, percept: &Percept) -> Effects {
+        let mut effects = self.sense_obstacles(percept);
         let Some(state) = &mut self.state else {
-            return Effects::new();
+            return effects;
         };
         let aims_anew = self.tasking.look(now, percept, state);
         let expects_cells = state.expects_cells();
         let sections = &state.negotiation.sections;
         let Some(executive) = &mut state.executive else {
-            return Effects::new();
+            return effects;
         };
         executive.expect_cells(expects_cells);
         let is_open = |c: u16| !sections.covered().contains(c);
         let (mut setpoint, events) = executive.step(percept, &is_open);
         self.trails.note(self.id, executive.take_traced());
-        let mut effects = Effects::new();
         if aims_anew {
             effects.push(Effect::Negotiate);
         }
@@ -340,6 +379,12 @@ impl Cooperation {
                 self.trails.hear(record.author, record.subject, trail);
                 Effects::new()
             }
+            Body::Obstacles(told) => {
+                if self.obstacles.hear(record.author, told) {
+                    return self.fly_round_found();
+                }
+                Effects::new()
+            }
             Body::Intent(_) | Body::Conflict(_) => {
                 let state = self.state.as_mut();
                 if let Some(separation) = state.and_then(|s| s.separation.as_mut()) {
@@ -360,7 +405,9 @@ impl Cooperation {
 
     /// Looks at everything that depends on time.
     pub fn tick(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
-        let mut effects = self.consider_mission();
+        let mut effects = self.fly_round_found();
+        effects.extend(self.obstacles.tick(s));
+        effects.extend(self.consider_mission());
         let order = self.order();
         let Some(state) = &mut self.state else {
             return effects;

@@ -137,6 +137,7 @@ fn told(report: &Report) -> Option<String> {
         }
         Report::Finished { revision } => format!("believes revision {revision} finished"),
         Report::Revised { mission } => format!("was given revision {}", mission.revision),
+        Report::Found { mission } => crate::found_obstacles::sentence(mission),
         Report::Task { name, news, .. } => news.sentence(name),
         Report::Detected { id, told } => told.sentence(id.author),
         Report::Crowd { told } => told.sentence(),

@@ -25,6 +25,7 @@
 //! | [`offload`] | work that takes too long for a percept to wait |
 //! | [`wire`] | keys, kinds, messages, their bytes and limits |
 //! | [`mission`], `task`, [`cells`] | what is to be seen, and what was |
+//! | [`found_obstacles`] | obstacles that UAVs sense and no map shows |
 //! | [`library`] | how a mission comes in pieces |
 //!
 //! Each part takes events and returns effects; none touches another.
@@ -109,6 +110,7 @@ mod diary;
 mod effect;
 pub mod errand;
 pub mod footprint;
+pub mod found_obstacles;
 mod fuel;
 pub mod gathering;
 pub mod hint;

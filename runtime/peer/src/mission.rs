@@ -23,7 +23,7 @@ use skein_flight::route::{RouteLimits, Router};
 use skein_geometry::frame::Point;
 use skein_geometry::{Polygon, PolygonError};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// A point in millimetres east and north of the mission's origin.
@@ -96,6 +96,10 @@ pub struct Mission {
     /// What may hide whom somebody follows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub buildings: Option<Arc<Buildings>>,
+    /// Whether what UAVs find on no map becomes a zone of it ([`crate::found_obstacles`]): then the
+    /// number of its revision has room for that.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub finds_obstacles: bool,
     // What an operator changes in flight stands last, so that most pieces of the next revision are
     // as they were (decision 139).
     /// Where UAVs loiter when all is done.
@@ -106,19 +110,31 @@ pub struct Mission {
     /// How many more times everything is to be seen after this one.
     #[serde(default, skip_serializing_if = "is_default")]
     pub further_laps: u16,
-    /// No-fly zones that the operator added in flight, by name; besides `zones`.
+    /// No-fly zones that the operator added in flight, by name, and those round what was found;
+    /// besides `zones`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub added_zones: BTreeMap<String, Vec<PointMm>>,
     /// Counts the missions that the operator began anew: nothing that was covered in an
     /// earlier one counts.
     #[serde(default, skip_serializing_if = "is_default")]
     pub sortie: u16,
+    /// Zones round what was found that the operator took out, by name.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub dismissed: BTreeSet<String>,
     /// Whether the operator ended it: nothing is to be seen, and all fly home.
     #[serde(default, skip_serializing_if = "core::ops::Not::not")]
     pub cancelled: bool,
-    /// Counts the operator's changes; a later one replaces an earlier one.
+    /// Counts the operator's changes, the laps of a patrol and what was found; a later one
+    /// replaces an earlier one.
     pub revision: u32,
 }
+
+/// Where missions count what is found: obstacles are counted in the upper six bits of the low half
+/// of the revision's number, laps in the lower ten.
+pub(crate) const FOUND_SHIFT: u32 = 10;
+
+/// Laps of a patrol that counts what is found, at most.
+pub const FOUND_LAPS_MAX: u16 = 1_000;
 
 /// Whether a field need not be said.
 pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
@@ -192,6 +208,9 @@ pub enum GeometryError {
     /// The event that it watches has no sectors that can be seen, or no norm.
     #[error("crowd.{0}: {1}")]
     Crowd(&'static str, String),
+    /// It has more laps than its revisions can count.
+    #[error("at most {FOUND_LAPS_MAX} laps are flown where obstacles are found")]
+    Laps,
     /// Its buildings are too many, or one of them is none.
     #[error("buildings: {0}")]
     Buildings(String),
@@ -361,6 +380,9 @@ impl Mission {
             h.write_i64(-12);
             buildings.hash(&mut h);
         }
+        if self.finds_obstacles {
+            h.write_i64(-14);
+        }
         h.finish()
     }
 
@@ -376,13 +398,29 @@ impl Mission {
         if self.is_patrol() { high } else { 0 }
     }
 
+    /// Which bits of the number of a revision count laps.
+    fn laps_mask(&self) -> u32 {
+        if self.finds_obstacles {
+            (1 << FOUND_SHIFT) - 1
+        } else {
+            u32::from(u16::MAX)
+        }
+    }
+
+    /// How many more obstacles the number of the revision has room for; none where it counts none.
+    pub(crate) fn room_for_found(&self) -> Option<u32> {
+        let low = self.revision & u32::from(u16::MAX);
+        let room = (u32::from(u16::MAX) - low) >> FOUND_SHIFT;
+        self.finds_obstacles.then_some(room)
+    }
+
     /// Whether a revision is this one or another lap of the same patrol, as far as its number
     /// tells.
     #[must_use]
     pub fn has_lap_of(&self, revision: u32) -> bool {
-        let edited = u32::from(self.edit()) << 16;
-        let first = if edited > 0 {
-            edited
+        let counted = self.revision & !self.laps_mask();
+        let first = if self.is_patrol() && counted > 0 {
+            counted
         } else {
             self.revision.saturating_sub(u32::from(self.lap))
         };
@@ -401,6 +439,9 @@ impl Mission {
     #[must_use]
     pub fn later_lap(&self, revision: u32) -> Option<Self> {
         let laps = revision.checked_sub(self.revision).filter(|n| *n > 0)?;
+        if self.finds_obstacles && (revision ^ self.revision) > self.laps_mask() {
+            return None;
+        }
         let laps = u16::try_from(laps).ok()?;
         Some(Self {
             revision,
@@ -411,16 +452,17 @@ impl Mission {
     }
 
     /// The revision that the operator counts after the newest one, while this mission is held.
-    /// Laps count revisions, too, also where nobody hears the operator: during a patrol the
-    /// low half of the number is theirs, and the operator counts the high half.
+    /// Laps count revisions, too, and so does what is found, also where nobody hears the operator:
+    /// where there are any the low half of the number is theirs, and the operator counts the high
+    /// half.
     #[must_use]
     pub fn revision_after(&self, newest: u32) -> u32 {
-        let laps = if self.is_patrol() {
+        let others = if self.is_patrol() || self.finds_obstacles {
             u32::from(u16::MAX)
         } else {
             0
         };
-        (newest | laps).saturating_add(1)
+        (newest | others).saturating_add(1)
     }
 
     /// The pieces that have to be seen, each by one frame; none where the mission asks
@@ -582,6 +624,9 @@ impl Mission {
         self.check_layers().map_err(GeometryError::Layers)?;
         self.check_crowd()?;
         self.check_buildings()?;
+        if self.finds_obstacles && self.lap.saturating_add(self.further_laps) >= FOUND_LAPS_MAX {
+            return Err(GeometryError::Laps);
+        }
         if self.tasks.len() > BROUGHT_MAX || self.brought(false).len() < self.tasks.len() {
             let text = format!("at most {BROUGHT_MAX} fit, each as an operator may ask for it");
             return Err(GeometryError::Tasks(text));
@@ -675,6 +720,8 @@ mod tests {
             lap: 0,
             further_laps: 0,
             added_zones: BTreeMap::new(),
+            dismissed: Default::default(),
+            finds_obstacles: false,
             sortie: 0,
             cancelled: false,
             diagram: None,

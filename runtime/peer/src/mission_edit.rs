@@ -2,6 +2,7 @@
 //! begun anew or ended. Each change is a new revision of the whole mission, so it travels,
 //! lasts and is agreed upon like any other.
 
+use crate::found_obstacles::FOUND_PREFIX;
 use crate::mission::{GeometryError, Mission, PointMm};
 use skein_geometry::hash::Fnv;
 use skein_geometry::{NoFlyZones, Polygon};
@@ -27,9 +28,19 @@ pub enum EditError {
     /// No zone that an operator added has this name.
     #[error("no added zone is named {0:?}; there are: {1}")]
     Unknown(String, String),
+    /// Only zones round what UAVs found are called so.
+    #[error(
+        "zones round what UAVs found begin with {FOUND_PREFIX:?}, not {0:?}; choose another name"
+    )]
+    Found(String),
     /// One more is too many.
     #[error("{ADDED_ZONES_MAX} added zones are the most; remove one first")]
     TooMany,
+    /// One more is too many.
+    #[error(
+        "{DISMISSED_MAX} zones round what UAVs found were removed already; begin the mission anew"
+    )]
+    TooManyDismissed,
     /// It is no simple polygon.
     #[error("the zone is {0}")]
     Ring(skein_geometry::PolygonError),
@@ -45,6 +56,15 @@ pub fn is_zone_name(name: &str) -> bool {
     (1..=ZONE_NAME_MAX_BYTES).contains(&name.len()) && name.bytes().all(fits)
 }
 
+/// Zones round what was found that may have been taken out.
+pub const DISMISSED_MAX: usize = 32;
+
+/// Whether UAVs added it.
+#[must_use]
+pub fn is_found(zone: &str) -> bool {
+    zone.starts_with(FOUND_PREFIX)
+}
+
 impl Mission {
     /// The same with one more no-fly zone.
     ///
@@ -54,10 +74,14 @@ impl Mission {
         if !is_zone_name(name) {
             return Err(EditError::Name(name.to_owned()));
         }
+        if is_found(name) {
+            return Err(EditError::Found(name.to_owned()));
+        }
         if self.added_zones.contains_key(name) {
             return Err(EditError::Taken(name.to_owned()));
         }
-        if self.added_zones.len() >= ADDED_ZONES_MAX {
+        let added = self.added_zones.keys().filter(|name| !is_found(name));
+        if added.count() >= ADDED_ZONES_MAX {
             return Err(EditError::TooMany);
         }
         let points = ring.iter().copied().map(crate::mission::point_m).collect();
@@ -67,14 +91,23 @@ impl Mission {
         Ok(changed)
     }
 
-    /// The same without a no-fly zone that was added.
+    /// The same without a no-fly zone that was added. One round what UAVs found comes again if one
+    /// of them still senses it.
     ///
     /// # Errors
     /// When there is none of that name.
     pub fn without_zone(&self, name: &str) -> Result<Self, EditError> {
         let mut changed = self.clone();
         match changed.added_zones.remove(name) {
-            Some(_) => Ok(changed),
+            Some(_) => {
+                if is_found(name) {
+                    if changed.dismissed.len() >= DISMISSED_MAX {
+                        return Err(EditError::TooManyDismissed);
+                    }
+                    changed.dismissed.insert(name.to_owned());
+                }
+                Ok(changed)
+            }
             None => {
                 let names: Vec<&str> = self.added_zones.keys().map(String::as_str).collect();
                 let known = if names.is_empty() {
@@ -111,6 +144,7 @@ impl Mission {
             lap,
             further_laps: last - lap,
             added_zones: old.added_zones.clone(),
+            dismissed: old.dismissed.clone(),
             sortie: old.sortie,
             cancelled: false,
             ..self
@@ -123,6 +157,7 @@ impl Mission {
     pub fn submitted_after(self, old: &Self) -> Self {
         Self {
             added_zones: old.added_zones.clone(),
+            dismissed: old.dismissed.clone(),
             sortie: old.sortie.wrapping_add(1),
             cancelled: false,
             ..self
@@ -183,6 +218,13 @@ impl Mission {
                     h.write_i64(i64::from(p.0));
                     h.write_i64(i64::from(p.1));
                 }
+            }
+        }
+        if !self.dismissed.is_empty() {
+            h.write_i64(-15);
+            for name in &self.dismissed {
+                h.write_i64(i64::try_from(name.len()).unwrap_or(i64::MAX));
+                name.bytes().for_each(|b| h.write_i64(i64::from(b)));
             }
         }
         if self.sortie > 0 {

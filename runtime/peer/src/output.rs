@@ -225,6 +225,12 @@ pub enum Report {
         /// The mission.
         mission: Arc<Mission>,
     },
+    /// This peer knows of obstacles that are on no map, and follows its mission with zones round
+    /// them.
+    Found {
+        /// The mission.
+        mission: Arc<Mission>,
+    },
     /// Something about a task other than coverage.
     Task {
         /// Which.

@@ -17,6 +17,7 @@ use crate::wire::kinds::Kind;
 use crate::wire::message::Record;
 use crate::{Beliefs, Command, CoverageTask, Input, Output, Peer, PeerConfig, PeerId};
 use crate::{Report, Role, Time, Transmission};
+use skein_behaviors::obstacle::{Obstacle, Obstacles};
 use skein_behaviors::reactive::follow::fly;
 use skein_behaviors::{Order, Percept, Setpoint, Steer};
 use skein_flight::airframe::{Airframe, CLIMB_MPS};
@@ -65,6 +66,8 @@ pub fn mission(revision: u32, cols: i32, rows: i32) -> Mission {
         lap: 0,
         further_laps: 0,
         added_zones: BTreeMap::new(),
+        dismissed: Default::default(),
+        finds_obstacles: false,
         sortie: 0,
         cancelled: false,
         diagram: None,
@@ -98,6 +101,9 @@ pub fn airframe() -> Airframe {
         climb_mps: CLIMB_MPS,
     }
 }
+
+/// How far vehicles sense obstacles, metres.
+pub const OBSTACLE_RANGE_M: f64 = 250.0;
 
 /// One direction between two peers.
 #[derive(Clone, Copy, Debug)]
@@ -138,6 +144,8 @@ pub struct Seat {
     pub planner_withholds: bool,
     /// Whether the vehicle senses.
     pub senses: bool,
+    /// Obstacles that its vehicle senses where they are nearer than [`OBSTACLE_RANGE_M`].
+    pub obstacles: Vec<Obstacle>,
     /// Flight time left, seconds.
     pub fuel_s: f64,
     /// The wind that it flies in and senses, m/s towards east and north.
@@ -182,6 +190,9 @@ impl Seat {
             failsafe: false,
             circles_per_m: None,
             traffic: skein_behaviors::traffic::Traffic::default(),
+            obstacles: Obstacles::new(self.obstacles.iter().copied().filter(|o| {
+                (o.at() - self.pose.position()).norm() - o.radius_m() < OBSTACLE_RANGE_M
+            })),
             sightings: skein_behaviors::sightings::Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
             crowd: skein_behaviors::crowd::CrowdLook::default(),
@@ -314,6 +325,7 @@ impl Harness {
             store_ms: 10,
             planner_withholds: false,
             senses: uav,
+            obstacles: Vec::new(),
             fuel_s: 3600.0,
             wind_mps: (0.0, 0.0),
             pose: Pose {

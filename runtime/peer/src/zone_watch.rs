@@ -9,15 +9,17 @@
 //! | lie elsewhere | nothing, until the plan changes with the loop | nothing |
 
 use crate::effect::Effect;
-use crate::mission::Mission;
+use crate::found_obstacles::{MARGIN_DM, zone_round};
+use crate::mission::{Mission, point_m};
 use crate::mission_state::MissionState;
+use crate::wire::obstacle::Found;
 use skein_behaviors::executive::new_zones::NewZone;
+use skein_behaviors::obstacle::Obstacle;
 use skein_geometry::{NoFlyZones, Polygon};
 
 impl MissionState {
     /// A newer mission is held whole: its zones are kept clear of from now on.
     pub fn heed(&mut self, newest: &Mission) -> Option<Effect> {
-        let executive = self.executive.as_mut()?;
         let known: Vec<_> = self.geometry.mission.zones_m().collect();
         let new = newest.zones_m().filter(|zone| !known.contains(zone));
         // One that is no polygon makes a mission that nobody flies.
@@ -25,6 +27,28 @@ impl MissionState {
         if new.is_empty() {
             return None;
         }
+        self.heed_zones(new)
+    }
+
+    /// What is sensed and is in no zone of the newest mission is kept clear of from now on.
+    pub fn heed_obstacles(&mut self, newest: &Mission, sensed: &[Obstacle]) -> Option<Effect> {
+        let round = sensed.iter().map(|o| Found {
+            again: 0,
+            east_dm: o.east_dm,
+            north_dm: o.north_dm,
+            radius_dm: o.radius_dm.saturating_add(MARGIN_DM),
+        });
+        let round = round.filter_map(|f| {
+            let ring = zone_round(&f).into_iter().map(point_m);
+            Polygon::new(ring.collect()).ok()
+        });
+        let zones = newest.zones_m().filter_map(|zone| Polygon::new(zone).ok());
+        let all = zones.chain(round).collect();
+        self.heed_zones(all)
+    }
+
+    fn heed_zones(&mut self, new: Vec<Polygon>) -> Option<Effect> {
+        let executive = self.executive.as_mut()?;
         let new = NoFlyZones::new(new);
         executive.heed(&new);
         let at = executive.place()?;

@@ -45,6 +45,8 @@ pub(crate) struct Fleet {
     pub(crate) separation_m: f64,
     /// From one UAV's height slot to the next above it, metres.
     pub(crate) slot_step_m: f64,
+    /// How far UAVs sense obstacles that are on no map, metres, where the file says so.
+    pub(crate) obstacle_range_m: Option<f64>,
     /// How far UAVs sense each other, metres, where the file says so.
     pub(crate) traffic_range_m: Option<f64>,
     pub(crate) members: Vec<Member>,
@@ -108,6 +110,7 @@ pub(crate) fn read(
         "slot_step_m",
         "separation_m",
         "traffic_range_m",
+        "obstacle_range_m",
         "count",
         "airframes",
         "sensors",
@@ -162,8 +165,13 @@ pub(crate) fn read(
             "only UAVs that fly at one height sense each other; give separation_m too, or intruders",
         ));
     }
+    let obstacle_range_m = f
+        .get("obstacle_range_m")
+        .map(|n| n.number(0.0, 20_000.0, "metres"))
+        .transpose()?;
     Ok(Fleet {
         key,
+        obstacle_range_m,
         separation_m,
         slot_step_m: step_m,
         traffic_range_m,

@@ -11,6 +11,7 @@ pub(crate) mod fleet;
 mod intruders;
 pub(crate) mod lanes;
 pub(crate) mod layers;
+mod obstacles;
 pub(crate) mod operator;
 pub(crate) mod radio;
 pub(crate) mod run;
@@ -41,8 +42,8 @@ use skein_interop::airframe;
 use skein_interop::json::{Document, Error, Fields, Node, Places};
 use skein_netsim::fault::TimedFault;
 use skein_netsim::spec::{
-    ContourSpec, CrowdSpec, GroundStationSpec, IntruderSpec, RadioSpec, ServiceSpec, StormSpec,
-    VehicleSpec,
+    ContourSpec, CrowdSpec, GroundStationSpec, IntruderSpec, ObstacleSpec, RadioSpec, ServiceSpec,
+    StormSpec, VehicleSpec,
 };
 use skein_netsim::weather::Weather;
 use skein_peer::buildings::Buildings;
@@ -90,6 +91,7 @@ const FIELDS: &[&str] = &[
     "vehicles",
     "services",
     "intruders",
+    "obstacles",
     "contour",
     "crowd",
     "storm",
@@ -143,6 +145,8 @@ pub(crate) struct Stated {
     pub(crate) services: Vec<ServiceSpec>,
     /// Aircraft that are no members.
     pub(crate) intruders: Vec<IntruderSpec>,
+    /// Obstacles that are on no map.
+    pub(crate) obstacles: Vec<ObstacleSpec>,
     /// A road or a fire that no peer knows.
     pub(crate) contour: Option<ContourSpec>,
     /// The people of a mass event.
@@ -263,6 +267,9 @@ pub(crate) fn scenario(
         intruders: f
             .get("intruders")
             .map_or_else(|| Ok(Vec::new()), intruders::read)?,
+        obstacles: f
+            .get("obstacles")
+            .map_or_else(|| Ok(Vec::new()), obstacles::read)?,
         contour: f.get("contour").map(contour::read).transpose()?,
         crowd_there: f.get("crowd").map(crowd::read).transpose()?,
         findings,

@@ -51,6 +51,7 @@ use restarts::Restarts;
 use skein_link::RadioCounters;
 use skein_peer::Report;
 use skein_peer::input::AskedTask;
+use skein_peer::mission_edit::is_found;
 use skein_peer::output::{Status, TaskNews};
 use std::collections::{BTreeMap, BTreeSet};
 use tasks::{TaskReport, Tasks};
@@ -69,6 +70,8 @@ pub struct Ending<'a> {
     pub judge: &'a Judge,
     /// How near an aircraft that is no member came at most to a UAV at its height, metres.
     pub nearest_intruder_m: Option<f64>,
+    /// How near a UAV came at most to the edge of an obstacle that is on no map, metres.
+    pub nearest_obstacle_m: Option<f64>,
     /// How often links that were up went down: by range, by sight, by fault.
     pub link_cuts: (u64, u64, u64),
     /// Rules that the run broke, where somebody checked them.
@@ -87,6 +90,8 @@ pub struct Account {
     restarts: Restarts,
     connectivity: Connectivity,
     radio: RadioCounters,
+    /// Obstacles on no map that zones stand round, by the peer that knows most.
+    obstacles_found: usize,
     covered_ms: Option<u64>,
     ready: BTreeMap<u16, u32>,
     finished: BTreeSet<u16>,
@@ -115,6 +120,7 @@ impl Account {
             restarts: Restarts::default(),
             connectivity: Connectivity::default(),
             radio: RadioCounters::default(),
+            obstacles_found: 0,
             covered_ms: None,
             ready: BTreeMap::new(),
             finished: BTreeSet::new(),
@@ -313,6 +319,12 @@ impl Account {
             }
             Report::Detected { id, told } => (id.author == peer).then(|| told.sentence(id.author)),
             Report::Crowd { told } => (told.look.by == peer).then(|| told.sentence()),
+            Report::Found { mission } => {
+                let found = mission.added_zones.keys().filter(|z| is_found(z)).count();
+                let is_more = found > self.obstacles_found;
+                self.obstacles_found = self.obstacles_found.max(found);
+                is_more.then(|| skein_peer::found_obstacles::sentence(mission))
+            }
             Report::Round { .. } | Report::Revised { .. } | Report::Traced { .. } => None,
         }
     }
@@ -350,9 +362,15 @@ impl Account {
                 self.failures.push(text.clone());
                 Some(text)
             }
+            Fact::Collided(c) if c.is_free => {
+                let text = format!("uav{} flew into obstacle {}", c.uav, c.obstacle);
+                self.failures.push(text.clone());
+                Some(text)
+            }
             Fact::Seen { .. }
             | Fact::TooClose(_)
             | Fact::Intruded(_)
+            | Fact::Collided(_)
             | Fact::TookOff { .. }
             | Fact::Lost { .. }
             | Fact::Failsafe { .. } => None,
@@ -479,6 +497,8 @@ impl Account {
             zone_entries: ending.judge.entries(),
             nearest_approach_m: ending.judge.closest().map(|a| a.distance_m),
             nearest_intruder_m: ending.nearest_intruder_m,
+            nearest_obstacle_m: ending.nearest_obstacle_m,
+            obstacles_found: ending.nearest_obstacle_m.map(|_| self.obstacles_found),
             revisit_ms: ending.judge.longest_gap_ms(),
             revisit_late_ms: ending.judge.watched_gap_ms(now_ms / 2),
             kills: self.work.kills(&self.detection),

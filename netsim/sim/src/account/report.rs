@@ -81,6 +81,13 @@ pub struct RunReport {
     /// where none did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nearest_intruder_m: Option<f64>,
+    /// How near a UAV came at most to the edge of an obstacle that is on no map, metres; none where
+    /// there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nearest_obstacle_m: Option<f64>,
+    /// How many of such obstacles UAVs found and told each other of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacles_found: Option<usize>,
     /// The longest time in which a cell was not seen again, ms, where everything is to be
     /// seen several times.
     pub revisit_ms: Option<u64>,

@@ -76,6 +76,7 @@ fn concluded(a: &Account, now_ms: u64) -> RunReport {
         now_ms,
         judge: world.judge(),
         nearest_intruder_m: world.intruders().nearest_m(),
+        nearest_obstacle_m: world.unmapped().nearest_m(),
         link_cuts: (1, 2, 3),
         violations: None,
         details: Details::Live(Live::default()),

@@ -135,6 +135,9 @@ impl RunReport {
         if let Some(m) = self.nearest_intruder_m {
             write!(f, ", of an intruder {m:.1} m")?;
         }
+        if let (Some(m), Some(found)) = (self.nearest_obstacle_m, self.obstacles_found) {
+            write!(f, ", of an obstacle {m:.1} m ({found} found)")?;
+        }
         writeln!(f)?;
         if let Some(ms) = self.revisit_ms {
             write!(f, "  revisit    {:.1} s at most", secs(ms))?;

@@ -18,7 +18,7 @@ use crate::fault::Fault;
 use crate::spec::Spec;
 use crate::world::Approach;
 use crate::world::contour::Contour;
-use crate::world::fact::Intrusion;
+use crate::world::fact::{Collision, Intrusion};
 use skein_flight::coverage::ring::backtracking::{Division, RingCell, Uav};
 use skein_geometry::frame::Point;
 use skein_peer::cells::CellSet;
@@ -386,6 +386,11 @@ impl Checker {
     /// An aircraft that is no member came too near, though there was time to make way (S13).
     pub fn on_intrusion(&mut self, intrusion: &Intrusion) {
         ProgressCheck::on_intrusion(intrusion, &mut self.found);
+    }
+
+    /// A UAV flew into an obstacle that is on no map, though it could turn away (S14).
+    pub fn on_collision(&mut self, collision: &Collision) {
+        ProgressCheck::on_collision(collision, &mut self.found);
     }
 
     /// A UAV flew into a zone.

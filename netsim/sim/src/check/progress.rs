@@ -4,7 +4,7 @@
 use super::membership::Membership;
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use crate::world::Approach;
-use crate::world::fact::Intrusion;
+use crate::world::fact::{Collision, Intrusion};
 use skein_peer::wire::message::Order;
 use std::collections::BTreeMap;
 
@@ -76,6 +76,14 @@ impl ProgressCheck {
         let i = *intrusion;
         found.broken("S13", i.at_ms, Some(i.uav), || {
             format!("kept {:.1} m from intruder {}", i.across_m, i.intruder)
+        });
+    }
+
+    /// A UAV flew into an obstacle that is on no map.
+    pub fn on_collision(collision: &Collision, found: &mut Findings) {
+        let c = *collision;
+        found.broken("S14", c.at_ms, Some(c.uav), || {
+            format!("flew into obstacle {}", c.obstacle)
         });
     }
 

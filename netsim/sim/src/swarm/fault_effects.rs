@@ -68,7 +68,11 @@ impl Swarm {
                 let next = self.next_mission(Mission { base, ..before });
                 // A console refuses one that nobody can fly to.
                 let geometry = self.geometry_cache.of(&next);
-                if geometry.is_ok_and(|g| g.base_is_clear().is_ok()) {
+                // Nor does anybody make a base of where a crane stands.
+                let room_m = next.clearance_m() + 2.0 * next.turn_radius_m();
+                let unmapped = self.air.world().unmapped();
+                let stands_free = unmapped.is_clear(next.base_m(), room_m);
+                if stands_free && geometry.is_ok_and(|g| g.base_is_clear().is_ok()) {
                     self.revise(next);
                 }
                 0
@@ -302,6 +306,25 @@ impl Swarm {
             self.account.revised();
             self.revise(next);
         }
+    }
+
+    /// A peer knows of obstacles that are on no map: the mission with zones round them is judged by,
+    /// and it is what the operator changes next.
+    pub(super) fn obstacles_found(&mut self, mission: &Arc<Mission>) {
+        let newest = self.operator.mission();
+        let is_lap = || newest.later_lap(mission.revision).as_ref() == Some(&**mission);
+        if mission.revision <= newest.revision || is_lap() {
+            return;
+        }
+        let survey = Survey::of_mission(&self.spec, mission);
+        let (Ok(geometry), Ok(survey)) = (self.geometry_cache.of(mission), survey) else {
+            return;
+        };
+        let survey = survey.as_planned(&geometry);
+        self.air.revise(Arc::new(survey), &geometry);
+        self.account.revised();
+        self.operator.give(Arc::clone(mission));
+        self.checker.rules.on_mission(mission);
     }
 
     /// The operator's next revision enters at the ground station.

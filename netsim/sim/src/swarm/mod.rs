@@ -483,6 +483,9 @@ impl Swarm {
                 Fact::Intruded(intrusion) if intrusion.is_warned => {
                     self.checker.on_intrusion(&intrusion);
                 }
+                Fact::Collided(collision) if collision.is_free => {
+                    self.checker.on_collision(&collision);
+                }
                 _ => {}
             }
         }
@@ -818,6 +821,9 @@ impl Swarm {
             self.checker.found.broken("S8", self.now_ms, Some(id), || {
                 format!("refused what another peer said: {reason}")
             });
+        }
+        if let Report::Found { mission } = &report {
+            self.obstacles_found(mission);
         }
         if let Report::Ready {
             revision,

@@ -76,7 +76,11 @@ impl Swarm {
                 self.history
                     .keep(at_ms, || What::Failsafe { peer: uav, on });
             }
-            Fact::Seen { .. } | Fact::TooClose(_) | Fact::Intruded(_) | Fact::Lost { .. } => {}
+            Fact::Seen { .. }
+            | Fact::TooClose(_)
+            | Fact::Intruded(_)
+            | Fact::Collided(_)
+            | Fact::Lost { .. } => {}
         }
     }
 }

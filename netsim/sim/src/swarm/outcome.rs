@@ -84,6 +84,7 @@ impl Swarm {
             now_ms: self.now_ms,
             judge: self.air.judge(),
             nearest_intruder_m: self.air.world().intruders().nearest_m(),
+            nearest_obstacle_m: self.air.world().unmapped().nearest_m(),
             link_cuts: self.air.link_cuts(),
             violations: Some(Violations {
                 counts: found

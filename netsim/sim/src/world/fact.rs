@@ -32,6 +32,19 @@ pub struct Intrusion {
     pub is_warned: bool,
 }
 
+/// A UAV flew into an obstacle that is on no map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Collision {
+    /// When, milliseconds.
+    pub at_ms: u64,
+    /// Who.
+    pub uav: u16,
+    /// Into which, by its place in the world.
+    pub obstacle: usize,
+    /// Whether it had flown and been commanded for long enough to turn away.
+    pub is_free: bool,
+}
+
 /// Something that truly happened.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fact {
@@ -59,6 +72,8 @@ pub enum Fact {
     TooClose(Approach),
     /// An aircraft that is no member came too near.
     Intruded(Intrusion),
+    /// A UAV flew into an obstacle that is on no map.
+    Collided(Collision),
     /// An airframe is gone.
     Lost {
         /// When, milliseconds.

@@ -25,6 +25,7 @@ mod separation;
 pub mod services;
 pub mod survey;
 mod task_board;
+pub mod unmapped;
 pub mod vehicles;
 mod watch;
 
@@ -46,6 +47,7 @@ use intruders::Intruders;
 use launcher::Launchers;
 use motion::{Kinematic, Piece};
 use services::Services;
+use skein_behaviors::obstacle::Obstacles as ObstaclesSensed;
 use skein_behaviors::traffic::{Sighting as Seen, Traffic};
 use skein_behaviors::{Percept, Setpoint};
 use skein_flight::coverage::ring::patch::{Corners, Patches};
@@ -55,6 +57,7 @@ use skein_peer::{Call, CoverageTask, Mission};
 use std::collections::BTreeSet;
 use std::iter;
 use std::sync::Arc;
+use unmapped::Unmapped;
 use vehicles::Vehicles;
 
 /// The world moves in steps of at most this long, aligned to its multiples, so that
@@ -175,6 +178,8 @@ pub struct World {
     vehicles: Vehicles,
     services: Services,
     intruders: Intruders,
+    unmapped: Unmapped,
+    obstacle_range_m: f64,
     weather: Weather,
     launchers: Option<Launchers>,
     contour: Option<Contour>,
@@ -260,6 +265,8 @@ impl World {
             vehicles: Vehicles::new(&spec.vehicles, seed),
             services: Services::new(&spec.services),
             intruders: Intruders::new(&spec.intruders, seed),
+            unmapped: Unmapped::new(spec, seed),
+            obstacle_range_m: spec.obstacle_range_m,
             weather: spec.wind.clone(),
             launchers,
             contour: spec.contour.as_ref().map(|c| Contour::new(c, seed)),
@@ -472,6 +479,9 @@ impl World {
                     body.position(),
                     self.traffic_range_m,
                 )),
+            obstacles: ObstaclesSensed::new(
+                self.unmapped.sensed(body.position(), self.obstacle_range_m),
+            ),
             sightings: self
                 .vehicles
                 .look(body, uav, self.now_ms, &self.site.obstacles),
@@ -537,6 +547,12 @@ impl World {
     #[must_use]
     pub fn services(&self) -> &Services {
         &self.services
+    }
+
+    /// Obstacles that are on no map.
+    #[must_use]
+    pub fn unmapped(&self) -> &Unmapped {
+        &self.unmapped
     }
 
     /// Aircraft that are no members.
@@ -638,6 +654,7 @@ impl World {
             let (uav, launch) = (u.id, u.body.pose());
             self.judge.forget_position(uav);
             self.intruders.is_bound(uav, now_ms);
+            self.unmapped.is_bound(uav, now_ms);
             if let Some(launchers) = &mut self.launchers {
                 launchers.join(uav, launch, now_ms);
                 launchers.hold(now_ms, &mut self.uavs, &mut self.facts);
@@ -678,6 +695,7 @@ impl World {
             u.body.advance(to_ms, &mut self.flown);
             if u.body.failsafe() || u.body.takes_off_in_ms(to_ms) > 0 {
                 self.intruders.is_bound(u.id, to_ms);
+                self.unmapped.is_bound(u.id, to_ms);
             }
             if self.flown.is_empty() && u.body.takes_off_in_ms(to_ms) == 0 {
                 // It takes off at this instant, and its camera shows what is below already.
@@ -718,6 +736,8 @@ impl World {
             &mut self.facts,
         );
         self.intruders
+            .observe(to_ms, &self.airborne, &mut self.facts);
+        self.unmapped
             .observe(to_ms, &self.airborne, &mut self.facts);
     }
 }

@@ -131,7 +131,8 @@ pub enum What {
         /// Revision of the mission.
         revision: u32,
     },
-    /// The operator gave another revision of the mission.
+    /// The operator gave another revision of the mission, or a peer knows of obstacles that are on
+    /// no map.
     Revised {
         /// Which.
         revision: u32,

@@ -90,6 +90,7 @@ impl Scene {
                 failsafe: false,
                 circles_per_m: None,
                 traffic: skein_behaviors::traffic::Traffic::default(),
+                obstacles: skein_behaviors::obstacle::Obstacles::default(),
                 sightings: skein_behaviors::sightings::Sightings::new(sighted),
             };
             let town = self.mission.town();

@@ -41,6 +41,7 @@ fn percept(now_ms: u64, at: Point, seen: &[(f64, f64, u8)]) -> Percept {
         failsafe: false,
         circles_per_m: None,
         traffic: skein_behaviors::traffic::Traffic::default(),
+        obstacles: skein_behaviors::obstacle::Obstacles::default(),
     }
 }
 

@@ -6,6 +6,7 @@ mod fuel;
 mod hostile;
 mod life;
 mod missions;
+mod obstacles;
 mod orders;
 mod relays;
 mod stores;

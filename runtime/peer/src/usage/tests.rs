@@ -87,6 +87,7 @@ fn percept(time_ms: u64, at: Point) -> Percept {
         failsafe: false,
         circles_per_m: None,
         traffic: skein_behaviors::traffic::Traffic::default(),
+        obstacles: skein_behaviors::obstacle::Obstacles::default(),
         sightings: skein_behaviors::sightings::Sightings::new([]),
     }
 }

@@ -23,6 +23,7 @@ use super::message::{
     Lacking, ListedRun, Member, MissionChunk, MissionStatus, OffLoop, Order, Orders, Record, Round,
     Stamp, State,
 };
+use super::obstacle::FoundObstacles;
 use super::signature::{SIGNATURE_MAX_BYTES, Signer, Verifier};
 use super::target::Target;
 use super::tasks::{Bundle, Task};
@@ -103,6 +104,7 @@ pub enum Body {
     Count(Count),
     Usage(Usage),
     Crowd(CrowdTile),
+    Obstacles(FoundObstacles),
 }
 
 impl Body {
@@ -130,6 +132,7 @@ impl Body {
             Self::Count(_) => Kind::Count,
             Self::Usage(_) => Kind::Usage,
             Self::Crowd(_) => Kind::Crowd,
+            Self::Obstacles(_) => Kind::Obstacle,
         }
     }
 
@@ -168,6 +171,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Count(b) => b.put(&mut out),
         Body::Usage(b) => b.put(&mut out),
         Body::Crowd(b) => b.put(&mut out),
+        Body::Obstacles(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -205,6 +209,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Count => Body::Count(Wire::get(&mut input)?),
         Kind::Usage => Body::Usage(Wire::get(&mut input)?),
         Kind::Crowd => Body::Crowd(Wire::get(&mut input)?),
+        Kind::Obstacle => Body::Obstacles(Wire::get(&mut input)?),
         Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),

@@ -55,6 +55,8 @@ pub enum Kind {
     Usage = 19,
     /// The people of a mass event that the author saw.
     Crowd = 20,
+    /// Obstacles on no map that the author knows.
+    Obstacle = 21,
 }
 
 /// How long a record waiting to be sent matters.
@@ -112,7 +114,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 21] = [
+const TABLE: [KindRow; 22] = [
     KindRow {
         relayed: false,
         ..row(
@@ -313,11 +315,19 @@ const TABLE: [KindRow; 21] = [
             Lifetime::Ms(60_000),
         )
     },
+    // Others fly there, too.
+    row(
+        Kind::Obstacle,
+        "obstacle",
+        272,
+        Priority::Claim,
+        Lifetime::Ms(60_000),
+    ),
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -339,6 +349,7 @@ impl Kind {
         Self::Count,
         Self::Usage,
         Self::Crowd,
+        Self::Obstacle,
     ];
 
     /// Its number on the wire.
@@ -442,7 +453,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(21), None);
+        assert_eq!(Kind::of_number(22), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

@@ -84,6 +84,7 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
         Body::Count(c) => super::count::check(c),
         Body::Usage(u) => super::usage::check(u),
         Body::Crowd(t) => super::crowd::check(t),
+        Body::Obstacles(o) => super::obstacle::check(o),
     }
 }
 

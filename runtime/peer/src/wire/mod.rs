@@ -10,6 +10,7 @@ pub mod key;
 pub mod kinds;
 pub mod limits;
 pub mod message;
+pub mod obstacle;
 #[cfg(test)]
 pub(crate) mod samples;
 pub mod schema;

@@ -127,6 +127,10 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         Body::Crowd(super::crowd::samples::tile()),
         "841a1234567818518289021906681905c81906fe00021901360200890300000201000001008183021503",
     ));
+    all.push((
+        Body::Obstacles(super::obstacle::samples::obstacles()),
+        "81828400190c8439052118aa840119157c1908f2183c",
+    ));
     all
 }
 
@@ -354,6 +358,7 @@ pub fn largest() -> Vec<Body> {
     all.extend(super::count::samples::largest());
     all.extend(super::usage::samples::largest());
     all.extend(super::crowd::samples::largest());
+    all.extend(super::obstacle::samples::largest());
     all
 }
 

@@ -494,6 +494,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Count => Some(super::count::COUNT),
         Kind::Usage => Some(super::usage::USAGE),
         Kind::Crowd => Some(super::crowd::CROWD),
+        Kind::Obstacle => Some(super::obstacle::OBSTACLES),
         Kind::Event => None,
     }
 }

@@ -315,6 +315,7 @@ impl Kinematic {
             failsafe: self.failsafe,
             circles_per_m: self.circles_per_m(),
             traffic: skein_behaviors::traffic::Traffic::default(),
+            obstacles: skein_behaviors::obstacle::Obstacles::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
             contour: skein_behaviors::contour::ContourLook::default(),
             crowd: skein_behaviors::crowd::CrowdLook::default(),

@@ -4,6 +4,7 @@ use super::super::count::Count;
 use super::super::crowd::{CrowdTile, Sure};
 use super::super::detection::Detection;
 use super::super::limits::*;
+use super::super::obstacle::Found;
 use super::super::samples::{fresh, golden, gossip, largest, listing};
 use super::super::signature::Off;
 use super::super::target::Target;
@@ -422,6 +423,22 @@ fn every_limit_is_sharp() {
                 with(&|t| t.places[0].north_dm -= 1, "north_dm");
                 with(&|t| t.places[0].after_ds += 1, "after_ds");
             }
+            Body::Obstacles(o) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut Found), field| {
+                    let mut o = o.clone();
+                    change(&mut o.found[0]);
+                    refused(&Body::Obstacles(o), field);
+                };
+                with(&|f| f.again += 1, "again");
+                with(&|f| f.east_dm -= 1, "east_dm");
+                with(&|f| f.north_dm -= 1, "north_dm");
+                with(&|f| f.radius_dm += 1, "radius_dm");
+                with(&|f| f.radius_dm = 0, "radius_dm");
+                let mut more = o.clone();
+                more.found.push(o.found[0]);
+                refused(&Body::Obstacles(more), "found");
+            }
             Body::Detection(d) => {
                 kinds += 1;
                 let with = |change: &dyn Fn(&mut Detection), field| {
@@ -508,7 +525,7 @@ fn every_limit_is_sharp() {
             Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 20);
+    assert_eq!(kinds, 21);
 }
 
 #[test]
@@ -564,7 +581,7 @@ fn envelopes_beyond_the_table_are_refused() {
     };
     assert!(of(|_| ()).is_ok());
     assert_eq!(of(|r| r.kind = 8), Err(WireError::Kind { number: 8 }));
-    assert_eq!(of(|r| r.kind = 21), Err(WireError::Kind { number: 21 }));
+    assert_eq!(of(|r| r.kind = 22), Err(WireError::Kind { number: 22 }));
     assert_eq!(
         of(|r| r.subject = 1),
         Err(WireError::Range { field: "subject" })

@@ -1,0 +1,54 @@
+//! Built-in trials where something stands that is on no map: what comes of that.
+
+use crate::{Overrides, load_builtin};
+use skein_netsim::Prepared;
+use skein_netsim::fault::Fault;
+use skein_netsim::runs::{Wanted, run};
+use skein_netsim::swarm::Outcome;
+
+/// The trial with so many UAVs, in calm but for the one that is lost, where there is another; with
+/// their sensors, or without.
+fn flown(uavs: u16, seed: u64, senses: bool) -> Outcome {
+    let over = Overrides {
+        peers: Some(uavs),
+        ..Overrides::default()
+    };
+    let mut spec = load_builtin("cranes", &over).unwrap().spec;
+    if !senses {
+        spec.obstacle_range_m = 0.0;
+    }
+    let prepared = Prepared::new(spec);
+    let mut faults = prepared.spec.faults.clone();
+    faults.retain(|f| !matches!(f.fault, Fault::Kill { peer } if peer > uavs || uavs == 1));
+    run(&prepared, seed, faults, Wanted::default())
+}
+
+#[test]
+fn what_stands_on_no_map_is_flown_round_by_one_uav_and_by_many_and_the_rest_is_seen() {
+    for (uavs, seeds) in [(1, 1..2), (2, 1..2), (5, 1..4), (8, 1..2)] {
+        for seed in seeds {
+            let outcome = flown(uavs, seed, true);
+            let (report, broken) = (&outcome.report, outcome.violations());
+            assert!(
+                report.passed,
+                "{uavs} {seed}: {:?} {broken:?}",
+                report.reasons
+            );
+            let found = report.obstacles_found.unwrap();
+            assert!((2..=4).contains(&found), "{uavs} {seed}: {found} found");
+            let nearest_m = report.nearest_obstacle_m.unwrap();
+            assert!(nearest_m > 10.0, "{uavs} {seed}: {nearest_m}");
+        }
+    }
+}
+
+/// The same flights without sensors: so that what is judged can fail.
+#[test]
+fn without_a_sensor_uavs_fly_into_what_stands_there_and_the_judge_says_so() {
+    let broken = |seed: u64| {
+        let outcome = flown(5, seed, false);
+        let told = outcome.violations().iter().any(|v| v.check == "S14");
+        told && !outcome.report.passed && outcome.report.obstacles_found == Some(0)
+    };
+    assert!((1..4).all(broken));
+}
