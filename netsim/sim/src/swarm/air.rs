@@ -127,6 +127,11 @@ impl Air {
         self.world.limit_fuel(id, lasts_ms);
     }
 
+    /// Some follow a mission with this geometry, and the newest is another one.
+    pub fn follow_beside(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
+        self.world.follow_beside(survey, geometry);
+    }
+
     /// A revision of the mission is judged by from now on.
     pub fn revise(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
         self.world.revise(survey, geometry);

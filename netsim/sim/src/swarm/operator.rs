@@ -4,7 +4,7 @@
 use skein_behaviors::{Order, Orders};
 use skein_peer::input::{AskedTask, OperatorsTasks, TaskEdit};
 use skein_peer::{Incarnation, Mission};
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 /// So long it takes to carry an order to where no radio brings it, milliseconds.
@@ -18,6 +18,8 @@ pub(super) type Voice = (u32, Incarnation);
 #[derive(Debug)]
 pub(super) struct Operator {
     mission: Arc<Mission>,
+    /// Missions that peers made of it by what they found, by their contents.
+    found: BTreeSet<u64>,
     /// The standing orders, and in which life the ground station spoke them.
     orders: Option<(Orders, Option<Voice>)>,
     /// The record in which it spoke last.
@@ -37,6 +39,7 @@ impl Operator {
     pub(super) fn new(mission: Arc<Mission>) -> Self {
         Self {
             mission,
+            found: BTreeSet::new(),
             orders: None,
             spoken: Vec::new(),
             edits: VecDeque::new(),
@@ -65,6 +68,12 @@ impl Operator {
             further_laps,
             ..mission
         })
+    }
+
+    /// A peer follows this one, by what was found; whether it is news, and no mere lap.
+    pub(super) fn hears_of(&mut self, found: &Mission) -> bool {
+        let is_lap = self.mission.later_lap(found.revision).as_ref() == Some(found);
+        !is_lap && self.found.insert(found.content_hash())
     }
 
     /// Gives the next revision.

@@ -157,13 +157,33 @@ impl Judge {
         self.boards.push(board);
     }
 
+    /// Some follow another mission than the newest, which nobody else was told of: what they see of
+    /// it counts.
+    pub fn follow_beside(
+        &mut self,
+        wanted: Arc<Survey>,
+        claims: Option<Arc<Pieces>>,
+        (lap, further_laps): (u16, u16),
+        revision: u32,
+    ) {
+        let mut board = Board::new(revision, wanted);
+        board.watch_claims(claims);
+        board.begin_at(lap, further_laps);
+        for old in self.boards.iter().rev() {
+            board.remember(old);
+        }
+        board.next_lap();
+        self.boards.insert(self.boards.len() - 1, board);
+    }
+
     /// Whether a camera saw what peers that follow this revision call this cell, in that
-    /// many laps.
+    /// many laps: in one of the missions of that number, where several were found.
     #[must_use]
     pub fn saw(&self, revision: u32, cell: CellId, laps: u16) -> bool {
-        let mut boards = self.boards.iter().rev();
-        let board = boards.find(|b| b.revision() <= revision);
-        board.is_some_and(|b| b.saw(cell, laps))
+        let known = self.boards.iter().map(Board::revision);
+        let newest = known.filter(|r| *r <= revision).max();
+        let mut boards = self.boards.iter();
+        boards.any(|b| Some(b.revision()) == newest && b.saw(cell, laps))
     }
 
     /// A number that grows whenever [`Judge::saw`] may answer otherwise than before.

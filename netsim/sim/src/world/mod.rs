@@ -380,6 +380,15 @@ impl World {
         );
     }
 
+    /// Some follow a mission with this geometry, and the newest is another one.
+    pub fn follow_beside(&mut self, survey: Arc<Survey>, geometry: &MissionGeometry) {
+        let mission = &*geometry.mission;
+        let claims = claims(mission, Some(geometry));
+        let laps = (mission.lap, mission.further_laps);
+        self.judge
+            .follow_beside(survey, claims, laps, mission.revision);
+    }
+
     /// A task is to be seen since then, milliseconds, by one of these UAVs; asked twice it is
     /// asked once.
     pub fn ask(
