@@ -265,6 +265,8 @@ pub struct Executive {
     layered: Option<layers::Layered>,
     /// How it makes way for aircraft that are no members.
     well_clear: WellClear,
+    /// Whether it flies higher than its mission, over an aircraft that is no member.
+    passes_over: bool,
 }
 
 impl Executive {
@@ -307,6 +309,7 @@ impl Executive {
             passes: passes::Passes::default(),
             layered: None,
             well_clear: WellClear::default(),
+            passes_over: false,
         }
     }
 

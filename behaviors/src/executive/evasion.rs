@@ -4,18 +4,21 @@
 //! |---|---|
 //! | what is flown next leads too near to an aircraft that flies straight on | an evasion, from percept to percept |
 //! | the way to where it was to be is clear again | a new track to the cell that it was in, or whatever else was to be flown |
-//! | UAVs keep apart by agreement | what was promised is flown |
+//! | UAVs keep apart by agreement, and one comes near what was promised | that is flown, higher, until it is past |
 //!
-//! How to evade is told by [`well_clear`](crate::reactive::well_clear). Cells that it left are flown
+//! How to evade is told by [`well_clear`](crate::reactive::well_clear), and how high to pass by
+//! [`pass_over`]. Cells that it left are flown
 //! anew, as after any silence; what the camera sees meanwhile counts.
 
 use super::{Executive, Kind};
 use crate::percept::Percept;
+use crate::reactive::follow::Track;
+use crate::reactive::pass_over::{self, Level};
 use crate::reactive::well_clear::Flight;
 use crate::setpoint::Setpoint;
 use crate::traffic::Aircraft;
 use skein_geometry::Segment;
-use skein_geometry::frame::{Point, Vector};
+use skein_geometry::frame::{Point, Pose, Vector};
 
 impl Executive {
     /// Whether it makes way for an aircraft that is no member.
@@ -54,19 +57,10 @@ impl Executive {
         let turns_per_m = turns_radps.map_or(0.0, |s| s.turn_rate_radps) / airspeed_mps;
         let wanted = |after_s: f64| -> Point {
             let along_m = ground_mps * after_s;
-            let planned = track.and_then(|t| {
-                let until_m = (t.at_m() + along_m).min(t.end_m());
-                let left_m = t.at_m() + along_m - until_m;
-                Some((t.pose_at(until_m)?, circles_per_m, left_m))
-            });
-            let (start, curvature_per_m, length_m) =
-                planned.unwrap_or((percept.pose, turns_per_m, along_m));
-            let beyond = Segment {
-                start,
-                curvature_per_m,
-                length_m,
-            };
-            beyond.end().position()
+            match track {
+                Some(track) => along(track, circles_per_m, along_m),
+                None => on_circle(percept.pose, turns_per_m, along_m),
+            }
         };
         let is_free = |at: Point| zones.zones().is_empty() || zones.distance_m(at) >= least_m;
         let steers = self.well_clear.steer(&own, &aircraft, wanted, is_free);
@@ -79,6 +73,48 @@ impl Executive {
         self.plays(percept, &setpoint);
         Some(setpoint)
     }
+
+    /// The height at which what was promised is flown now, metres.
+    pub(super) fn passes_at_m(&mut self, percept: &Percept, bend_per_m: f64) -> f64 {
+        let aircraft: Vec<Aircraft> = percept.traffic.aircraft().copied().collect();
+        let own = Level {
+            height_m: percept.height_m,
+            level_m: self.height_m,
+            climb_mps: self.transit.airframe.climb_mps,
+        };
+        self.passes_over = false;
+        if aircraft.is_empty() || !percept.height_m.is_finite() {
+            return own.level_m;
+        }
+        let speed_mps = self.speed_mps();
+        let place = |after_s: f64| along(&self.track, bend_per_m, speed_mps * after_s);
+        let height_m = pass_over::height_m(&own, &aircraft, place);
+        self.passes_over = height_m > own.level_m;
+        height_m
+    }
+
+    /// Whether it flies higher than its mission, over an aircraft that is no member.
+    #[must_use]
+    pub fn passes_over(&self) -> bool {
+        self.passes_over
+    }
+}
+
+/// Where a track leads in so many metres, and beyond its end a turn.
+fn along(track: &Track, bend_per_m: f64, along_m: f64) -> Point {
+    let until_m = (track.at_m() + along_m).min(track.end_m());
+    let left_m = track.at_m() + along_m - until_m;
+    let end = track.pose_at(until_m);
+    end.map_or_else(Point::origin, |end| on_circle(end, bend_per_m, left_m))
+}
+
+fn on_circle(start: Pose, curvature_per_m: f64, length_m: f64) -> Point {
+    let turn = Segment {
+        start,
+        curvature_per_m,
+        length_m,
+    };
+    turn.end().position()
 }
 
 #[cfg(test)]

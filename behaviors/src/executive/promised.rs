@@ -174,8 +174,10 @@ impl Executive {
         };
         let limit = self.transit.airframe.max_turn_rate_radps(airspeed_mps);
         let steps = air::steps(&self.track, offset.unwrap_or(still), &air, limit);
+        let bend_per_m = self.contingency.as_ref().map_or(0.0, |c| c.bend_per_m);
         let wanted = Setpoint {
             airspeed_mps,
+            height_m: self.passes_at_m(percept, bend_per_m),
             ..self.setpoint(percept, steps)
         };
         let setpoint = self.envelope.check(percept, wanted);

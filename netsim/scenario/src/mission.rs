@@ -136,17 +136,17 @@ fn turning(s: &Stated) -> Result<f64, Error> {
     })))
 }
 
-/// How far UAVs sense each other, metres: what is stated, or what flying at one height asks
-/// for.
+/// How far UAVs sense each other and aircraft that are no members, metres: what is stated, or what
+/// flying at one height and making way ask for.
 pub(crate) fn traffic_range_m(s: &Stated, mission: &Mission) -> f64 {
-    if mission.layers.is_some() {
-        return layers::SENSED_M;
-    }
-    let least_m = if s.fleet.separation_m > 0.0 {
+    let others_m = if mission.layers.is_some() {
+        layers::SENSED_M
+    } else if s.fleet.separation_m > 0.0 {
         mission.least_traffic_range_m()
     } else {
-        least_range_to_intruders_m(s)
+        0.0
     };
+    let least_m = others_m.max(least_range_to_intruders_m(s));
     s.fleet.traffic_range_m.unwrap_or_else(|| least_m.ceil())
 }
 
@@ -158,21 +158,14 @@ fn least_range_to_intruders_m(s: &Stated) -> f64 {
         return 0.0;
     };
     let wind_mps = s.wind.strongest_held().speed_mps();
-    let of = |m: &Member| intruders::least_range_m(&m.airframe, fastest_mps + wind_mps);
+    let is_promised = s.fleet.separation_m > 0.0;
+    let of =
+        |m: &Member| intruders::least_range_m(&m.airframe, fastest_mps + wind_mps, is_promised);
     s.fleet.members.iter().map(of).fold(0.0, f64::max)
 }
 
-/// Way is made for intruders by who flies at a height of its own.
+/// Every UAV senses intruders in time to make way for them.
 fn check_intruders(s: &Stated) -> Result<(), Error> {
-    if s.intruders.is_empty() {
-        return Ok(());
-    }
-    if s.fleet.separation_m > 0.0 || !s.layers_m.is_empty() {
-        return Err(s.places.wrong(
-            "intruders",
-            "UAVs that keep apart by agreement, at one height or in layers, make way for nobody else yet; leave out intruders, or fleet.separation_m and mission.layers_m",
-        ));
-    }
     let least_m = least_range_to_intruders_m(s).ceil();
     match s.fleet.traffic_range_m {
         Some(range_m) if range_m < least_m => Err(s.places.wrong(

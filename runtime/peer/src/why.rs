@@ -428,7 +428,10 @@ pub(crate) fn work(state: &MissionState, now: Time) -> Work {
         state_ms: state.stage.state_ms(now),
         does,
         layer: layer(state),
-        evades: state.executive.as_ref().is_some_and(Executive::evades),
+        evades: state
+            .executive
+            .as_ref()
+            .is_some_and(|e| e.evades() || e.passes_over()),
         able: state.able(),
         next_cells: open.iter().copied().take(NEXT_CELLS).collect(),
         open_cells: open.len(),

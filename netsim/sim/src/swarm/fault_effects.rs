@@ -308,26 +308,6 @@ impl Swarm {
         }
     }
 
-    /// A peer knows of obstacles that are on no map: the mission with zones round them is judged by,
-    /// and it is what the operator changes next, unless somebody knows of a newer one.
-    pub(super) fn obstacles_found(&mut self, mission: &Arc<Mission>) {
-        if !self.operator.hears_of(mission) {
-            return;
-        }
-        let survey = Survey::of_mission(&self.spec, mission);
-        let (Ok(geometry), Ok(survey)) = (self.geometry_cache.of(mission), survey) else {
-            return;
-        };
-        let survey = Arc::new(survey.as_planned(&geometry));
-        if mission.revision <= self.operator.mission().revision {
-            return self.air.follow_beside(survey, &geometry);
-        }
-        self.air.revise(survey, &geometry);
-        self.account.revised();
-        self.operator.give(Arc::clone(mission));
-        self.checker.rules.on_mission(mission);
-    }
-
     /// The operator's next revision enters at the ground station.
     fn revise(&mut self, next: Arc<Mission>) {
         self.operator.give(Arc::clone(&next));

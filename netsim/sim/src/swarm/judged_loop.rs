@@ -80,6 +80,15 @@ impl JudgedLoop {
         is_another
     }
 
+    /// Another mission of the same number is begun next, if any is.
+    pub(super) fn forget(&mut self) {
+        self.lap = 0;
+        self.mission = Arc::new(Mission {
+            revision: 0,
+            ..(*self.mission).clone()
+        });
+    }
+
     /// Marks what was seen since.
     pub(super) fn refresh(&mut self, air: &Air) {
         let Some(geometry) = &self.geometry else {

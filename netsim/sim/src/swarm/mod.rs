@@ -24,6 +24,7 @@
 mod air;
 mod crowd;
 mod fault_effects;
+mod found;
 mod judged_loop;
 pub mod latency;
 mod looks;
@@ -1139,15 +1140,6 @@ impl Swarm {
             self.account.connected(&components);
             self.history
                 .keep(self.now_ms, || What::Components(components));
-        }
-    }
-
-    /// A peer begins a mission, or a lap of one.
-    fn mission_begun(&mut self, revision: u32, loop_hash: u64) {
-        let given = self.operator.mission();
-        let (cache, air) = (&mut self.geometry_cache, &self.air);
-        if self.judged.begin(given, revision, loop_hash, (cache, air)) {
-            self.checker.on_new_loop(loop_hash);
         }
     }
 

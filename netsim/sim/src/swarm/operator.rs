@@ -4,7 +4,7 @@
 use skein_behaviors::{Order, Orders};
 use skein_peer::input::{AskedTask, OperatorsTasks, TaskEdit};
 use skein_peer::{Incarnation, Mission};
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 /// So long it takes to carry an order to where no radio brings it, milliseconds.
@@ -19,7 +19,7 @@ pub(super) type Voice = (u32, Incarnation);
 pub(super) struct Operator {
     mission: Arc<Mission>,
     /// Missions that peers made of it by what they found, by their contents.
-    found: BTreeSet<u64>,
+    found: BTreeMap<u64, Arc<Mission>>,
     /// The standing orders, and in which life the ground station spoke them.
     orders: Option<(Orders, Option<Voice>)>,
     /// The record in which it spoke last.
@@ -39,7 +39,7 @@ impl Operator {
     pub(super) fn new(mission: Arc<Mission>) -> Self {
         Self {
             mission,
-            found: BTreeSet::new(),
+            found: BTreeMap::new(),
             orders: None,
             spoken: Vec::new(),
             edits: VecDeque::new(),
@@ -71,9 +71,16 @@ impl Operator {
     }
 
     /// A peer follows this one, by what was found; whether it is news, and no mere lap.
-    pub(super) fn hears_of(&mut self, found: &Mission) -> bool {
-        let is_lap = self.mission.later_lap(found.revision).as_ref() == Some(found);
-        !is_lap && self.found.insert(found.content_hash())
+    pub(super) fn hears_of(&mut self, found: &Arc<Mission>) -> bool {
+        let is_lap = self.mission.later_lap(found.revision).as_ref() == Some(&**found);
+        let known = self.found.insert(found.content_hash(), Arc::clone(found));
+        !is_lap && known.is_none()
+    }
+
+    /// Others with the number of the newest, which somebody else found at the same time.
+    pub(super) fn found_beside(&self) -> impl Iterator<Item = &Arc<Mission>> {
+        let newest = self.mission.revision;
+        self.found.values().filter(move |m| m.revision == newest)
     }
 
     /// Gives the next revision.

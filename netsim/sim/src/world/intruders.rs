@@ -6,7 +6,8 @@
 
 use super::fact::{Fact, Intrusion};
 use super::obstacles::Place;
-use crate::spec::{IntruderSpec, IntruderWay};
+use crate::spec::{IntruderSpec, IntruderWay, Spec};
+use skein_behaviors::reactive::pass_over;
 use skein_behaviors::reactive::well_clear::{self, AHEAD_S, KEPT_HEIGHT_M, KEPT_M};
 use skein_behaviors::traffic::Aircraft;
 use skein_flight::airframe::Airframe;
@@ -21,11 +22,23 @@ const BEYOND_M: f64 = 2_000.0;
 
 /// Nobody could make way for what has flown as it does for less, seconds; nor has who took off, or
 /// got its computer back, for less.
-const WARNED_S: f64 = AHEAD_S;
+fn warned_s(spec: &Spec) -> f64 {
+    let airframes = spec.uavs.iter().map(|u| &u.airframe);
+    let passes_s = airframes.map(|a| pass_over::ahead_s(a.climb_mps));
+    if spec.mission.separation_mm > 0 {
+        passes_s.fold(AHEAD_S, f64::max)
+    } else {
+        AHEAD_S
+    }
+}
 
-/// How far a UAV has to sense an intruder that flies so fast, metres, to make way for it.
+/// How far a UAV has to sense an intruder that flies so fast, metres, to make way for it: to turn
+/// away, or to pass over where its way over the ground is promised.
 #[must_use]
-pub fn least_range_m(airframe: &Airframe, their_mps: f64) -> f64 {
+pub fn least_range_m(airframe: &Airframe, their_mps: f64, is_promised: bool) -> f64 {
+    if is_promised {
+        return pass_over::least_range_m(airframe.cruise_mps, airframe.climb_mps, their_mps);
+    }
     let radius_m = airframe.min_turn_radius_m();
     well_clear::least_range_m(airframe.cruise_mps, radius_m, their_mps)
 }
@@ -45,6 +58,8 @@ pub struct Flown {
 #[derive(Clone, Debug)]
 pub struct Intruders {
     specs: Arc<[IntruderSpec]>,
+    /// Who was warned for less could not make way, seconds.
+    warned_s: f64,
     seed: u64,
     nearest_m: Option<f64>,
     near: BTreeSet<(usize, u16)>,
@@ -53,20 +68,19 @@ pub struct Intruders {
 }
 
 impl Intruders {
-    pub(super) fn new(specs: &[IntruderSpec], seed: u64) -> Self {
+    pub(super) fn of(spec: &Spec, seed: u64) -> Self {
+        Self::new(&spec.intruders, warned_s(spec), seed)
+    }
+
+    fn new(specs: &[IntruderSpec], warned_s: f64, seed: u64) -> Self {
         Self {
             specs: specs.into(),
+            warned_s,
             seed,
             nearest_m: None,
             near: BTreeSet::new(),
             bound_ms: BTreeMap::new(),
         }
-    }
-
-    /// What they are, in the order of the scenario.
-    #[must_use]
-    pub fn specs(&self) -> &[IntruderSpec] {
-        &self.specs
     }
 
     /// How near one came at most to a UAV at its height, metres, across.
@@ -162,7 +176,7 @@ impl Intruders {
                 }
                 let bound_ms = self.bound_ms.get(uav).copied().unwrap_or(0);
                 let free_s = seconds(at_ms.saturating_sub(bound_ms));
-                let is_warned = f.straight_s >= WARNED_S && free_s >= WARNED_S;
+                let is_warned = f.straight_s >= self.warned_s && free_s >= self.warned_s;
                 if self.near.insert((n, *uav)) {
                     facts.push(Fact::Intruded(Intrusion {
                         at_ms,
@@ -202,7 +216,7 @@ mod tests {
             height_m: 100.0,
             way,
         };
-        Intruders::new(&[spec], 7)
+        Intruders::new(&[spec], AHEAD_S, 7)
     }
 
     #[test]

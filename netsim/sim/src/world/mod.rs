@@ -264,7 +264,7 @@ impl World {
             judge,
             vehicles: Vehicles::new(&spec.vehicles, seed),
             services: Services::new(&spec.services),
-            intruders: Intruders::new(&spec.intruders, seed),
+            intruders: Intruders::of(spec, seed),
             unmapped: Unmapped::new(spec, seed),
             obstacle_range_m: spec.obstacle_range_m,
             weather: spec.wind.clone(),
