@@ -8,7 +8,8 @@
 //! | the same ones for so long that they may have spread, and all hear each other | that at cruise, shared evenly among them, times [`UNEVEN`], and [`LATE_MS`] |
 //!
 //! Where one of them makes way for an aircraft that is no member all begins anew: it may come back
-//! to the loop elsewhere, and they have to spread again.
+//! to the loop elsewhere, and they have to spread again. So it does where one of them flies another
+//! loop than the one that is judged, since no word of it came to it.
 
 use super::flight::{Flyer, milliseconds};
 use super::{Findings, PeerSnapshot, Snapshot};
@@ -110,7 +111,8 @@ impl WatchCheck {
         let rounders: BTreeSet<u16> = all.iter().map(|m| m.id).collect();
         let now_ms = snapshot.now_ms;
         let makes_way = all.iter().any(|m| m.view.evades);
-        if makes_way || (&rounders, snapshot.loop_hash) != (&self.rounders, self.loop_hash) {
+        let flies_another = all.iter().any(|m| m.view.loop_hash != snapshot.loop_hash);
+        if makes_way || flies_another || (&rounders, snapshot.loop_hash) != (&self.rounders, self.loop_hash) {
             self.rounders.clone_from(&rounders);
             self.loop_hash = snapshot.loop_hash;
             (self.since_ms, self.linked_ms) = (now_ms, now_ms);

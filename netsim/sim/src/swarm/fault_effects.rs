@@ -311,6 +311,7 @@ impl Swarm {
     /// The operator's next revision enters at the ground station.
     fn revise(&mut self, next: Arc<Mission>) {
         self.operator.give(Arc::clone(&next));
+        self.ask_for_what_is_left();
         self.checker.rules.on_mission(&next);
         if let Some(idx) = self.ground_station() {
             // What the operator said last is what the next life begins with.

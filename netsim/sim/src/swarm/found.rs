@@ -47,6 +47,21 @@ impl Swarm {
             self.judge_by_found(mission);
         } else if let Some((survey, geometry)) = self.surveyed(mission) {
             self.air.follow_beside(survey, &geometry);
+            self.ask_for_what_is_left();
+        }
+    }
+
+    /// Of the operator's newest mission nobody is asked for what obstacles hide that somebody has
+    /// found, who may never hear of that mission.
+    pub(super) fn ask_for_what_is_left(&mut self) {
+        let Some(round_all) = self.operator.round_all_found() else {
+            return;
+        };
+        let newest = Arc::clone(self.operator.mission());
+        let left = self.surveyed(&Arc::new(round_all));
+        let geometry = self.geometry_cache.of(&newest);
+        if let (Some((survey, _)), Ok(geometry)) = (left, geometry) {
+            self.air.revise(survey, &geometry);
         }
     }
 

@@ -3,6 +3,7 @@
 
 use skein_behaviors::{Order, Orders};
 use skein_peer::input::{AskedTask, OperatorsTasks, TaskEdit};
+use skein_peer::mission_edit::is_found;
 use skein_peer::{Incarnation, Mission};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -81,6 +82,17 @@ impl Operator {
     pub(super) fn found_beside(&self) -> impl Iterator<Item = &Arc<Mission>> {
         let newest = self.mission.revision;
         self.found.values().filter(move |m| m.revision == newest)
+    }
+
+    /// The newest mission with zones round all that any peer has found; none where it has them.
+    pub(super) fn round_all_found(&self) -> Option<Mission> {
+        let mut round = (*self.mission).clone();
+        for (name, ring) in self.found.values().flat_map(|m| &m.added_zones) {
+            if is_found(name) && !round.dismissed.contains(name) {
+                round.added_zones.insert(name.clone(), ring.clone());
+            }
+        }
+        (round.added_zones != self.mission.added_zones).then_some(round)
     }
 
     /// Gives the next revision.
