@@ -87,8 +87,18 @@ impl Executive {
             return own.level_m;
         }
         let speed_mps = self.speed_mps();
-        let place = |after_s: f64| along(&self.track, bend_per_m, speed_mps * after_s);
-        let height_m = pass_over::height_m(&own, &aircraft, place);
+        // What is promised ends soon, in a circle, or is gone on with.
+        let circles = |after_s: f64| along(&self.track, bend_per_m, speed_mps * after_s);
+        let flies_on = |after_s: f64| {
+            let (end_m, along_m) = (self.flight_end_m(), speed_mps * after_s);
+            let beyond_m = (self.track.at_m() + along_m - end_m).max(0.0);
+            let at = along(&self.track, bend_per_m, along_m - beyond_m);
+            let end = self.track.pose_at(end_m).filter(|_| beyond_m > 0.0);
+            end.map_or(at, |end| on_circle(end, 0.0, beyond_m))
+        };
+        let promised_s = (self.flight_end_m() - self.track.at_m()).max(0.0) / speed_mps;
+        let ways: [&dyn Fn(f64) -> Point; 2] = [&circles, &flies_on];
+        let height_m = pass_over::height_m(&own, &aircraft, &ways, promised_s);
         self.passes_over = height_m > own.level_m;
         height_m
     }

@@ -423,7 +423,7 @@ impl Executive {
 
     /// Where on the track the circle of the contingency begins, metres; the beginning of the
     /// present one where it circles already.
-    fn flight_end_m(&self) -> f64 {
+    pub(super) fn flight_end_m(&self) -> f64 {
         match self.stretches.get(self.flight_stretches()) {
             Some(Stretch {
                 kind: Kind::Loiter(circle),

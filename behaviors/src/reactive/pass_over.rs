@@ -21,11 +21,16 @@ use skein_geometry::frame::Point;
 /// Who comes nearer over the ground is looked at, metres.
 const NEAR_M: f64 = 1.3 * KEPT_M;
 
+/// Where nothing is promised yet a UAV may get beside what is reckoned with by so much, m/s, and at
+/// most, metres.
+const BESIDE_MPS: f64 = 4.0;
+const BESIDE_MOST_M: f64 = 30.0;
+
 /// What is asked for in height, metres: heights are held to some.
-const ASKED_M: f64 = KEPT_HEIGHT_M + 3.0;
+const ASKED_M: f64 = KEPT_HEIGHT_M + 1.0;
 
 /// And where another height is chosen, metres.
-const OVER_M: f64 = KEPT_HEIGHT_M + 6.0;
+const OVER_M: f64 = KEPT_HEIGHT_M + 4.0;
 
 /// So long it takes until a climb begins, seconds.
 const REACTION_S: f64 = 2.0;
@@ -45,11 +50,15 @@ pub struct Level {
     pub climb_mps: f64,
 }
 
-/// How far ahead is looked, seconds: from below one that is as far above as counts to above it.
+/// So long it takes to pass over one, seconds: from as far below as counts to above it.
 #[must_use]
-pub fn ahead_s(climb_mps: f64) -> f64 {
-    let climbs_s = (ASKED_M + OVER_M) / climb_mps.max(0.1);
-    (REACTION_S + climbs_s).min(AHEAD_MOST_S)
+pub fn passes_s(climb_mps: f64) -> f64 {
+    REACTION_S + (ASKED_M + OVER_M) / climb_mps.max(0.1)
+}
+
+/// How far ahead is looked, seconds: twice as long, where two come one after the other.
+fn ahead_s(climb_mps: f64) -> f64 {
+    (2.0 * passes_s(climb_mps)).min(AHEAD_MOST_S)
 }
 
 /// How far aircraft have to be sensed for a UAV to pass over one that flies straight at it,
@@ -59,32 +68,46 @@ pub fn least_range_m(own_mps: f64, climb_mps: f64, their_mps: f64) -> f64 {
     NEAR_M + (own_mps + their_mps) * ahead_s(climb_mps)
 }
 
-/// The height to fly to, metres; `place` tells where it is over the ground after so many seconds.
+/// The height to fly to, metres; each of `ways` tells where it may be over the ground after so many
+/// seconds, for certain as long as what is promised lasts.
 #[must_use]
-pub fn height_m(own: &Level, aircraft: &[Aircraft], place: impl Fn(f64) -> Point) -> f64 {
+pub fn height_m(
+    own: &Level,
+    aircraft: &[Aircraft],
+    ways: &[&dyn Fn(f64) -> Point],
+    promised_s: f64,
+) -> f64 {
     let ahead_s = ahead_s(own.climb_mps);
-    let here = place(0.0);
-    let reach_m = (place(ahead_s / 2.0) - here).norm() + (place(ahead_s) - here).norm();
-    let near = aircraft.iter().filter(|a| {
-        let comes_m = a.velocity_mps().norm() * ahead_s;
-        (a.at() - here).norm() < NEAR_M + comes_m + 2.0 * reach_m.max(ahead_s)
-    });
-    let near: Vec<&Aircraft> = near.collect();
+    let times = (0..).map(|k| STEP_S * f64::from(k));
+    let times: Vec<f64> = times.take_while(|t| *t <= ahead_s).collect();
+    let flown: Vec<Vec<Point>> = ways
+        .iter()
+        .map(|way| times.iter().map(|t| way(*t)).collect())
+        .collect();
+    let mut near: Vec<&Aircraft> = Vec::new();
+    let mut meets: Vec<(f64, f64)> = Vec::new();
+    for a in aircraft {
+        // Between two samples it may come nearer.
+        let near_m = NEAR_M + a.velocity_mps().norm() * STEP_S;
+        let comes_near = |k: usize| {
+            let there = a.at() + a.velocity_mps() * times[k];
+            let beside_m = BESIDE_MPS * (times[k] - promised_s).max(0.0);
+            let near_m = near_m + beside_m.min(BESIDE_MOST_M);
+            flown.iter().any(|way| (way[k] - there).norm() < near_m)
+        };
+        let met = (0..times.len()).filter(|k| comes_near(*k));
+        let before = meets.len();
+        meets.extend(met.map(|k| (times[k], a.height_m())));
+        if meets.len() > before {
+            near.push(a);
+        }
+    }
     if near.is_empty() {
         return own.level_m;
     }
-    let times = (0..).map(|k| STEP_S * f64::from(k));
-    let times = times.take_while(|t| *t <= ahead_s);
-    let mut meets: Vec<(f64, f64)> = Vec::new();
-    for t in times {
-        let at = place(t);
-        let met = near
-            .iter()
-            .filter(|a| (a.at() + a.velocity_mps() * t - at).norm() < NEAR_M);
-        meets.extend(met.map(|a| (t, a.height_m())));
-    }
-    let keeps_m = |to_m: f64| {
-        let apart = meets.iter().map(|(t, height_m)| {
+    let keeps_m = |to_m: f64, until_s: f64| {
+        let met = meets.iter().filter(|(t, _)| *t <= until_s);
+        let apart = met.map(|(t, height_m)| {
             let most_m = own.climb_mps * t;
             let flown_m = own.height_m + (to_m - own.height_m).clamp(-most_m, most_m);
             (flown_m - height_m).abs()
@@ -99,14 +122,17 @@ pub fn height_m(own: &Level, aircraft: &[Aircraft], place: impl Fn(f64) -> Point
         .chain([own.level_m])
         .collect();
     heights.sort_by(f64::total_cmp);
-    let clear = heights.iter().find(|h| keeps_m(**h) >= ASKED_M);
-    let widest = || {
-        let widest = heights
-            .iter()
-            .max_by(|a, b| keeps_m(**a).total_cmp(&keeps_m(**b)));
-        widest.copied().unwrap_or(own.level_m)
-    };
-    clear.copied().unwrap_or_else(widest)
+    if let Some(clear) = heights.iter().find(|h| keeps_m(**h, ahead_s) >= ASKED_M) {
+        return *clear;
+    }
+    // Whoever comes first goes before.
+    let soon_s = passes_s(own.climb_mps);
+    let worth = |h: &f64| (keeps_m(*h, soon_s).min(ASKED_M), keeps_m(*h, ahead_s));
+    let widest = heights.iter().rev().max_by(|a, b| {
+        let (a, b) = (worth(a), worth(b));
+        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+    widest.copied().unwrap_or(own.level_m)
 }
 
 #[cfg(test)]
@@ -156,7 +182,12 @@ mod tests {
             let sensed = all.iter().filter(|(at, ..)| (at - here).norm() < range_m);
             let sensed: Vec<Aircraft> = sensed.map(|(at, v, h)| aircraft(*at, *v, *h)).collect();
             let to_m = if passes {
-                height_m(&own, &sensed, |s| here + Vector::new(13.0 * s, 0.0))
+                height_m(
+                    &own,
+                    &sensed,
+                    &[&|s| here + Vector::new(13.0 * s, 0.0)],
+                    9.0,
+                )
             } else {
                 own.level_m
             };
@@ -203,8 +234,8 @@ mod tests {
         let across = |north_m: f64, height_m: f64| {
             aircraft(Point::new(100.0, north_m), Vector::new(0.0, 30.0), height_m)
         };
-        let fly = |a: Aircraft| height_m(&own, &[a], place);
-        assert!(fly(across(-230.0, 60.0)) > 80.0, "it meets this one");
+        let fly = |a: Aircraft| height_m(&own, &[a], &[&place], f64::INFINITY);
+        assert!(fly(across(-230.0, 60.0)) > 75.0, "it meets this one");
         for other in [
             across(-230.0, 79.0),
             across(-900.0, 60.0),

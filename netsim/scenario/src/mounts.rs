@@ -6,7 +6,7 @@ use crate::read::Stated;
 use crate::read::targets::Asked;
 use crate::request::AreaPlanner;
 use skein_flight::airframe::{Airframe, ROLL_RATE_RADPS};
-use skein_flight::mount::{DIRECTION_OFF_RAD, Mount};
+use skein_flight::mount::{DIRECTION_OFF_RAD, Mount, ROLL_SPARE_RAD};
 use skein_flight::trajectory::wind::Wind;
 use skein_interop::json::Error;
 
@@ -54,10 +54,15 @@ pub(crate) fn check_mounts(s: &Stated) -> Result<(), Error> {
         let bank_deg = m.airframe.max_bank_rad.to_degrees();
         let why = match m.airframe.mount {
             Mount::Level => continue,
-            Mount::Gimbal(g) if g.roll_rad >= m.airframe.max_bank_rad => continue,
+            Mount::Gimbal(_) if m.airframe.mount.holds_in_turns(m.airframe.max_bank_rad) => {
+                continue;
+            }
             Mount::Gimbal(g) => format!(
-                "a gimbal that rolls {:.0}° cannot hold a picture in turns of {bank_deg:.0}°",
-                g.roll_rad.to_degrees()
+                "a gimbal that rolls {:.0}° cannot hold a picture in turns of {bank_deg:.0}°, for which it takes {:.0}°",
+                g.roll_rad.to_degrees(),
+                (m.airframe.max_bank_rad + ROLL_SPARE_RAD)
+                    .to_degrees()
+                    .ceil()
             ),
             Mount::Fixed => "a fixed camera tilts with the turns of lanes".to_owned(),
         };

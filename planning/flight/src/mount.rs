@@ -14,6 +14,10 @@ pub const TOLD_RAD: f64 = 0.004;
 /// and both axes do so by Pythagoras.
 pub const DIRECTION_OFF_RAD: f64 = 3.0 * TOLD_RAD;
 
+/// So much farther than wings bank a gimbal has to roll to hold a picture in turns, radians: for
+/// the error of the path, which it looks across to.
+pub const ROLL_SPARE_RAD: f64 = 0.05;
+
 /// How a camera is held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Mount {
@@ -51,5 +55,12 @@ impl Mount {
             Self::Gimbal(gimbal) => Some(*gimbal),
             Self::Level | Self::Fixed => None,
         }
+    }
+
+    /// Whether a gimbal holds its picture in turns in which wings bank so far, radians.
+    #[must_use]
+    pub fn holds_in_turns(&self, bank_rad: f64) -> bool {
+        let gimbal = self.gimbal();
+        gimbal.is_some_and(|g| g.roll_rad >= bank_rad + ROLL_SPARE_RAD)
     }
 }

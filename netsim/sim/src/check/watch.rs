@@ -112,7 +112,10 @@ impl WatchCheck {
         let now_ms = snapshot.now_ms;
         let makes_way = all.iter().any(|m| m.view.evades);
         let flies_another = all.iter().any(|m| m.view.loop_hash != snapshot.loop_hash);
-        if makes_way || flies_another || (&rounders, snapshot.loop_hash) != (&self.rounders, self.loop_hash) {
+        if makes_way
+            || flies_another
+            || (&rounders, snapshot.loop_hash) != (&self.rounders, self.loop_hash)
+        {
             self.rounders.clone_from(&rounders);
             self.loop_hash = snapshot.loop_hash;
             (self.since_ms, self.linked_ms) = (now_ms, now_ms);

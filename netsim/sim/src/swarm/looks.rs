@@ -143,7 +143,8 @@ impl Swarm {
         let Some(footprint) = peer.peer.as_ref().and_then(|p| p.footprint()) else {
             return;
         };
-        let is_held = body.airframe().mount.gimbal().is_some();
+        let (mount, bank_rad) = (&body.airframe().mount, body.airframe().max_bank_rad);
+        let is_held = mount.holds_in_turns(bank_rad);
         let (rules, found) = (&mut self.checker.rules, &mut self.checker.found);
         let look = (self.now_ms, id);
         rules.footprint.on_look(

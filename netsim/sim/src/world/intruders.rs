@@ -24,7 +24,7 @@ const BEYOND_M: f64 = 2_000.0;
 /// got its computer back, for less.
 fn warned_s(spec: &Spec) -> f64 {
     let airframes = spec.uavs.iter().map(|u| &u.airframe);
-    let passes_s = airframes.map(|a| pass_over::ahead_s(a.climb_mps));
+    let passes_s = airframes.map(|a| pass_over::passes_s(a.climb_mps));
     if spec.mission.separation_mm > 0 {
         passes_s.fold(AHEAD_S, f64::max)
     } else {
