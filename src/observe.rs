@@ -201,6 +201,7 @@ fn json(seen: &Observed, record: &Record, body: &Body) -> serde_json::Value {
         Body::Usage(b) => serde_json::to_value(b),
         Body::Crowd(b) => serde_json::to_value(b),
         Body::Obstacles(b) => serde_json::to_value(b),
+        Body::Aircraft(b) => serde_json::to_value(b),
     };
     serde_json::json!({
         "key": seen.key,
@@ -334,6 +335,11 @@ fn words(author: u16, body: &Body) -> String {
                 places.join(", ")
             )
         }
+        Body::Aircraft(s) => format!(
+            "senses {} aircraft that are no members, at {} ms of the clock of percepts",
+            s.seen.len(),
+            s.at_ms
+        ),
         Body::Trail(t) => format!(
             "tells {} places of a contour, the first seen at {} ms of the clock of percepts",
             t.places.len(),

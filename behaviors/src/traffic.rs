@@ -45,7 +45,9 @@ impl Sighting {
 pub const AIRCRAFT_MAX: usize = 8;
 
 /// An aircraft that is no member: it says nothing, agrees to nothing, and makes way for nobody.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
 pub struct Aircraft {
     /// Where, decimetres east of the mission's origin.
     pub east_dm: i32,

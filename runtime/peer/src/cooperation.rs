@@ -50,6 +50,7 @@ use crate::output::{Report, Status};
 use crate::protocol::membership::Membership;
 use crate::protocol::negotiation::{Adoption, are_many};
 use crate::protocol::runs::PlannedCell;
+use crate::sensed_aircraft::ToldAircraft;
 use crate::tasking::Tasking;
 use crate::timers::{Timer, Timers};
 use crate::trails::Trails;
@@ -100,6 +101,7 @@ pub(crate) struct Cooperation {
     pub(crate) tasking: Tasking,
     pub(crate) trails: Trails,
     obstacles: KnownObstacles,
+    aircraft: ToldAircraft,
     mismatch_told: bool,
     /// When a piece of a mission came last.
     piece_came: Time,
@@ -114,6 +116,7 @@ impl Cooperation {
             tasking: Tasking::new(config),
             trails: Trails::default(),
             obstacles: KnownObstacles::default(),
+            aircraft: ToldAircraft::default(),
             orders: StandingOrders::default(),
             state: None,
             mismatch_told: false,
@@ -291,6 +294,7 @@ impl Cooperation {
     /// A percept: fly, and note what the camera saw.
     pub fn on_percept(&mut self, now: Time, percept: &Percept) -> Effects {
         let mut effects = self.sense_obstacles(percept);
+        let percept = &self.aircraft.complete(percept);
         let Some(state) = &mut self.state else {
             return effects;
         };
@@ -385,6 +389,10 @@ impl Cooperation {
                 }
                 Effects::new()
             }
+            Body::Aircraft(told) => {
+                self.aircraft.hear(record.author, told);
+                Effects::new()
+            }
             Body::Intent(_) | Body::Conflict(_) => {
                 let state = self.state.as_mut();
                 if let Some(separation) = state.and_then(|s| s.separation.as_mut()) {
@@ -407,6 +415,7 @@ impl Cooperation {
     pub fn tick(&mut self, s: &Situation<'_>, timers: &mut Timers) -> Effects {
         let mut effects = self.fly_round_found();
         effects.extend(self.obstacles.tick(s));
+        effects.extend(self.aircraft.tick(s));
         effects.extend(self.consider_mission());
         let order = self.order();
         let Some(state) = &mut self.state else {

@@ -25,7 +25,7 @@
 //! | [`offload`] | work that takes too long for a percept to wait |
 //! | [`wire`] | keys, kinds, messages, their bytes and limits |
 //! | [`mission`], `task`, [`cells`] | what is to be seen, and what was |
-//! | [`found_obstacles`] | obstacles that UAVs sense and no map shows |
+//! | [`found_obstacles`], `sensed_aircraft` | what UAVs sense and no map shows |
 //! | [`library`] | how a mission comes in pieces |
 //!
 //! Each part takes events and returns effects; none touches another.
@@ -132,6 +132,7 @@ pub mod peer;
 pub mod protocol;
 mod registers;
 pub mod relay_circle;
+mod sensed_aircraft;
 mod separation;
 mod sight;
 mod stage;

@@ -20,6 +20,7 @@
 //! | usage | what grew of streets, once its interval of the day is over, and every 40 I before that, of turns every 80 I: one at most every I; each of these for each eight UAVs that are believed alive, begun ones too |
 //! | crowd | when a sector became too dense or eased, within I, and twice more, 2 I apart; what else its looks say that nobody told for as long as the mission says, four times that where nobody is, half of it where that changed for certain, and what nobody told as fully for four times that: every 2 I for each UAV that is believed alive |
 //! | obstacle | when something is known that nobody who is believed alive says: at once by who found it, else two intervals later and one more for each with a lower number |
+//! | aircraft | while its UAV senses aircraft that are no members: every 4 I, the four nearest |
 //!
 //! I is the interval that this peer's beacons announce, a period T where there is room.
 

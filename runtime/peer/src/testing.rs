@@ -19,6 +19,7 @@ use crate::{Beliefs, Command, CoverageTask, Input, Output, Peer, PeerConfig, Pee
 use crate::{Report, Role, Time, Transmission};
 use skein_behaviors::obstacle::{Obstacle, Obstacles};
 use skein_behaviors::reactive::follow::fly;
+use skein_behaviors::traffic::{Aircraft, Traffic};
 use skein_behaviors::{Order, Percept, Setpoint, Steer};
 use skein_flight::airframe::{Airframe, CLIMB_MPS};
 use skein_flight::coverage::ring::Tree;
@@ -146,6 +147,8 @@ pub struct Seat {
     pub senses: bool,
     /// Obstacles that its vehicle senses where they are nearer than [`OBSTACLE_RANGE_M`].
     pub obstacles: Vec<Obstacle>,
+    /// Aircraft that its vehicle senses, as they fly at time 0.
+    pub aircraft: Vec<Aircraft>,
     /// Flight time left, seconds.
     pub fuel_s: f64,
     /// The wind that it flies in and senses, m/s towards east and north.
@@ -189,7 +192,7 @@ impl Seat {
             launch_ready: false,
             failsafe: false,
             circles_per_m: None,
-            traffic: skein_behaviors::traffic::Traffic::default(),
+            traffic: Traffic::default().with_aircraft(self.aircraft_at(now_ms)),
             obstacles: Obstacles::new(self.obstacles.iter().copied().filter(|o| {
                 (o.at() - self.pose.position()).norm() - o.radius_m() < OBSTACLE_RANGE_M
             })),
@@ -198,6 +201,18 @@ impl Seat {
             crowd: skein_behaviors::crowd::CrowdLook::default(),
             attitude: None,
         }
+    }
+
+    /// Where the aircraft are that it senses.
+    #[must_use]
+    pub fn aircraft_at(&self, now_ms: u64) -> Vec<Aircraft> {
+        let ms = i32::try_from(now_ms).unwrap_or(i32::MAX);
+        let flown = |a: &Aircraft| Aircraft {
+            east_dm: a.east_dm + i32::from(a.east_dmps) * (ms / 20) / 50,
+            north_dm: a.north_dm + i32::from(a.north_dmps) * (ms / 20) / 50,
+            ..*a
+        };
+        self.aircraft.iter().map(flown).collect()
     }
 
     /// Flies the last setpoint, or straight on without one.
@@ -326,6 +341,7 @@ impl Harness {
             planner_withholds: false,
             senses: uav,
             obstacles: Vec::new(),
+            aircraft: Vec::new(),
             fuel_s: 3600.0,
             wind_mps: (0.0, 0.0),
             pose: Pose {

@@ -1,5 +1,6 @@
 //! What a peer does, each behaviour in a few lines: peers in virtual time, without a world.
 
+mod aircraft;
 mod crowds;
 mod diagrams;
 mod fuel;

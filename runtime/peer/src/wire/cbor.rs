@@ -192,6 +192,17 @@ impl Wire for i32 {
     }
 }
 
+impl Wire for i16 {
+    fn put(&self, out: &mut Out) {
+        out.write(*self);
+    }
+
+    fn get(input: &mut In<'_>) -> Result<Self, WireError> {
+        let value = input.signed()?;
+        Self::try_from(value).map_err(|_| WireError::Range { field: "value" })
+    }
+}
+
 impl Wire for bool {
     fn put(&self, out: &mut Out) {
         out.write(*self);

@@ -10,6 +10,7 @@
 //! Nothing here recurses with the input, allocates more than a few times its length,
 //! or panics. The primitives are in `cbor.rs`, schemas in [`super::schema`].
 
+use super::aircraft::SensedAircraft;
 use super::cbor::{In, Listed, Out, Wire, array_of, in_field, number_of};
 use super::count::Count;
 use super::crowd::CrowdTile;
@@ -105,6 +106,7 @@ pub enum Body {
     Usage(Usage),
     Crowd(CrowdTile),
     Obstacles(FoundObstacles),
+    Aircraft(SensedAircraft),
 }
 
 impl Body {
@@ -133,6 +135,7 @@ impl Body {
             Self::Usage(_) => Kind::Usage,
             Self::Crowd(_) => Kind::Crowd,
             Self::Obstacles(_) => Kind::Obstacle,
+            Self::Aircraft(_) => Kind::Aircraft,
         }
     }
 
@@ -172,6 +175,7 @@ pub fn encode_body(body: &Body) -> Vec<u8> {
         Body::Usage(b) => b.put(&mut out),
         Body::Crowd(b) => b.put(&mut out),
         Body::Obstacles(b) => b.put(&mut out),
+        Body::Aircraft(b) => b.put(&mut out),
     }
     out.into_bytes()
 }
@@ -210,6 +214,7 @@ pub fn decode_body(kind: Kind, bytes: &[u8]) -> Result<Body, WireError> {
         Kind::Usage => Body::Usage(Wire::get(&mut input)?),
         Kind::Crowd => Body::Crowd(Wire::get(&mut input)?),
         Kind::Obstacle => Body::Obstacles(Wire::get(&mut input)?),
+        Kind::Aircraft => Body::Aircraft(Wire::get(&mut input)?),
         Kind::Event => {
             return Err(WireError::Kind {
                 number: kind.number(),

@@ -57,6 +57,8 @@ pub enum Kind {
     Crowd = 20,
     /// Obstacles on no map that the author knows.
     Obstacle = 21,
+    /// Aircraft that are no members, as the author senses them.
+    Aircraft = 22,
 }
 
 /// How long a record waiting to be sent matters.
@@ -114,7 +116,7 @@ const fn row(
 // matters until the longest partition a mission tolerates, and is repaired by
 // anti-entropy afterwards.
 // Caps: the largest valid body, which a test of `codec` computes, rounded up.
-const TABLE: [KindRow; 22] = [
+const TABLE: [KindRow; 23] = [
     KindRow {
         relayed: false,
         ..row(
@@ -323,11 +325,22 @@ const TABLE: [KindRow; 22] = [
         Priority::Claim,
         Lifetime::Ms(60_000),
     ),
+    // Out of date when the next look is told.
+    KindRow {
+        relayed: false,
+        ..row(
+            Kind::Aircraft,
+            "aircraft",
+            104,
+            Priority::Telemetry,
+            Lifetime::Beacons(2),
+        )
+    },
 ];
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Beacon,
         Self::State,
         Self::Bid,
@@ -350,6 +363,7 @@ impl Kind {
         Self::Usage,
         Self::Crowd,
         Self::Obstacle,
+        Self::Aircraft,
     ];
 
     /// Its number on the wire.
@@ -453,7 +467,7 @@ mod tests {
             assert_eq!(Kind::of_name(kind.name()), Some(kind));
             assert!(kind.cap_bytes() + super::super::codec::ENVELOPE_MAX_BYTES <= RECORD_MAX_BYTES);
         }
-        assert_eq!(Kind::of_number(22), None);
+        assert_eq!(Kind::of_number(23), None);
         assert_eq!(Kind::of_name("rumour"), None);
     }
 

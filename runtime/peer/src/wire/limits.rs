@@ -85,6 +85,7 @@ pub(super) fn check(body: &Body) -> Result<(), WireError> {
         Body::Usage(u) => super::usage::check(u),
         Body::Crowd(t) => super::crowd::check(t),
         Body::Obstacles(o) => super::obstacle::check(o),
+        Body::Aircraft(s) => super::aircraft::check(s),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Keys, kinds, messages, their bytes and their signatures.
 
+pub mod aircraft;
 pub(crate) mod cbor;
 pub mod codec;
 pub mod count;

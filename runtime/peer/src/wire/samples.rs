@@ -131,6 +131,10 @@ pub fn golden() -> Vec<(Body, &'static str)> {
         Body::Obstacles(super::obstacle::samples::obstacles()),
         "81828400190c8439052118aa840119157c1908f2183c",
     ));
+    all.push((
+        Body::Aircraft(super::aircraft::samples::aircraft()),
+        "821a00013df881851904b43901391902bc19015e33",
+    ));
     all
 }
 
@@ -359,6 +363,7 @@ pub fn largest() -> Vec<Body> {
     all.extend(super::usage::samples::largest());
     all.extend(super::crowd::samples::largest());
     all.extend(super::obstacle::samples::largest());
+    all.extend(super::aircraft::samples::largest());
     all
 }
 

@@ -495,6 +495,7 @@ pub fn places(kind: Kind) -> Option<&'static [Place]> {
         Kind::Usage => Some(super::usage::USAGE),
         Kind::Crowd => Some(super::crowd::CROWD),
         Kind::Obstacle => Some(super::obstacle::OBSTACLES),
+        Kind::Aircraft => Some(super::aircraft::SENSED),
         Kind::Event => None,
     }
 }

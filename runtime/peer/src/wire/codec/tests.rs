@@ -1,5 +1,6 @@
 //! Bytes of all kinds: typical, largest, refused, cut short, changed.
 
+use super::super::aircraft::SensedAircraft;
 use super::super::count::Count;
 use super::super::crowd::{CrowdTile, Sure};
 use super::super::detection::Detection;
@@ -439,6 +440,19 @@ fn every_limit_is_sharp() {
                 more.found.push(o.found[0]);
                 refused(&Body::Obstacles(more), "found");
             }
+            Body::Aircraft(a) => {
+                kinds += 1;
+                let with = |change: &dyn Fn(&mut SensedAircraft), field| {
+                    let mut a = a.clone();
+                    change(&mut a);
+                    refused(&Body::Aircraft(a), field);
+                };
+                with(&|a| a.at_ms += 1, "at_ms");
+                with(&|a| a.seen.push(a.seen[0]), "seen");
+                with(&|a| a.seen[0].east_dm -= 1, "east_dm");
+                with(&|a| a.seen[0].north_dm -= 1, "north_dm");
+                with(&|a| a.seen[0].height_dm -= 1, "height_dm");
+            }
             Body::Detection(d) => {
                 kinds += 1;
                 let with = |change: &dyn Fn(&mut Detection), field| {
@@ -525,7 +539,7 @@ fn every_limit_is_sharp() {
             Body::Finished(_) => {}
         }
     }
-    assert_eq!(kinds, 21);
+    assert_eq!(kinds, 22);
 }
 
 #[test]
@@ -581,7 +595,7 @@ fn envelopes_beyond_the_table_are_refused() {
     };
     assert!(of(|_| ()).is_ok());
     assert_eq!(of(|r| r.kind = 8), Err(WireError::Kind { number: 8 }));
-    assert_eq!(of(|r| r.kind = 22), Err(WireError::Kind { number: 22 }));
+    assert_eq!(of(|r| r.kind = 23), Err(WireError::Kind { number: 23 }));
     assert_eq!(
         of(|r| r.subject = 1),
         Err(WireError::Range { field: "subject" })
