@@ -3,12 +3,13 @@
 use crate::percept::Percept;
 use crate::reactive::follow::fly;
 use crate::setpoint::{Setpoint, Side};
+use crate::traffic::Aircraft;
 use skein_flight::airframe::{Airframe, CLIMB_MPS};
 use skein_flight::coverage::lanes;
 use skein_flight::coverage::ring::{CoverageLoop, LoopProblem};
 use skein_flight::mount::Mount;
 use skein_flight::route::{RouteLimits, Router};
-use skein_geometry::frame::{Point, Pose};
+use skein_geometry::frame::{Point, Pose, Vector};
 use skein_geometry::math::PI;
 use skein_geometry::{NoFlyZones, Polygon};
 use std::sync::Arc;
@@ -184,5 +185,18 @@ impl Wing {
                 1,
             )
         })
+    }
+}
+
+/// An aircraft that is no member.
+#[allow(clippy::cast_possible_truncation, reason = "some kilometres")]
+pub fn aircraft(at: Point, v: Vector, height_m: f64) -> Aircraft {
+    let dm = |m: f64| (10.0 * m).round() as i32;
+    Aircraft {
+        east_dm: dm(at.x),
+        north_dm: dm(at.y),
+        height_dm: dm(height_m),
+        east_dmps: (10.0 * v.x).round() as i16,
+        north_dmps: (10.0 * v.y).round() as i16,
     }
 }

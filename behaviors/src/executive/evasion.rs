@@ -131,8 +131,8 @@ fn on_circle(start: Pose, curvature_per_m: f64, length_m: f64) -> Point {
 mod tests {
     use crate::executive::pursuit::Quarry;
     use crate::executive::{Executive, Goal};
-    use crate::testing::{Wing, airframe, loop_and_router, square};
-    use crate::traffic::{Aircraft, Traffic};
+    use crate::testing::{Wing, aircraft, airframe, loop_and_router, square};
+    use crate::traffic::Traffic;
     use crate::{Event, Percept};
     use skein_flight::coverage::ring::Direction;
     use skein_flight::coverage::ring::backtracking::Leg;
@@ -141,18 +141,6 @@ mod tests {
     use skein_geometry::math::{TAU, sin_cos};
     use skein_geometry::random::SplitMix64;
     use std::collections::BTreeSet;
-
-    #[allow(clippy::cast_possible_truncation, reason = "some kilometres")]
-    fn aircraft(at: Point, v: Vector, height_m: f64) -> Aircraft {
-        let dm = |m: f64| (10.0 * m).round() as i32;
-        Aircraft {
-            east_dm: dm(at.x),
-            north_dm: dm(at.y),
-            height_dm: dm(height_m),
-            east_dmps: (10.0 * v.x).round() as i16,
-            north_dmps: (10.0 * v.y).round() as i16,
-        }
-    }
 
     /// Flies over an area while aircraft come straight at the UAV, one a minute, from any side;
     /// how near they came, how long it evaded, and how many cells were not seen.

@@ -138,21 +138,10 @@ pub fn height_m(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::aircraft;
     use skein_geometry::frame::Vector;
     use skein_geometry::math::{TAU, sin_cos};
     use skein_geometry::random::SplitMix64;
-
-    #[allow(clippy::cast_possible_truncation, reason = "some kilometres")]
-    fn aircraft(at: Point, v: Vector, height_m: f64) -> Aircraft {
-        let dm = |m: f64| (10.0 * m).round() as i32;
-        Aircraft {
-            east_dm: dm(at.x),
-            north_dm: dm(at.y),
-            height_dm: dm(height_m),
-            east_dmps: (10.0 * v.x).round() as i16,
-            north_dmps: (10.0 * v.y).round() as i16,
-        }
-    }
 
     /// Flies straight on among aircraft that cross; how near one came over the ground while it was
     /// nearer in height than is kept, and how high the UAV flew at most.

@@ -6,7 +6,8 @@
 //! given more room, field by field as the error names them, until all of it is taken.
 //!
 //! From seed 10,000 on there is more: gimbals, patrols, sites where vehicles are counted, a mass
-//! event that is watched, fleets at one height.
+//! event that is watched, fleets at one height; from 20,000 on aircraft that are no members, from
+//! 30,000 on obstacles that are on no map.
 //!
 //! # Guarantees
 //! One seed gives the same text on every machine.

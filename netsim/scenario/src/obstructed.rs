@@ -1,26 +1,16 @@
 //! Built-in trials where something stands that is on no map: what comes of that.
 
-use crate::{Overrides, load_builtin};
-use skein_netsim::Prepared;
-use skein_netsim::fault::Fault;
-use skein_netsim::runs::{Wanted, run};
+use crate::read::testing;
 use skein_netsim::swarm::Outcome;
 
 /// The trial with so many UAVs, in calm but for the one that is lost, where there is another; with
 /// their sensors, or without.
 fn flown(uavs: u16, seed: u64, senses: bool) -> Outcome {
-    let over = Overrides {
-        peers: Some(uavs),
-        ..Overrides::default()
-    };
-    let mut spec = load_builtin("cranes", &over).unwrap().spec;
-    if !senses {
-        spec.obstacle_range_m = 0.0;
-    }
-    let prepared = Prepared::new(spec);
-    let mut faults = prepared.spec.faults.clone();
-    faults.retain(|f| !matches!(f.fault, Fault::Kill { peer } if peer > uavs || uavs == 1));
-    run(&prepared, seed, faults, Wanted::default())
+    testing::flown("cranes", uavs, seed, |spec| {
+        if !senses {
+            spec.obstacle_range_m = 0.0;
+        }
+    })
 }
 
 #[test]

@@ -38,6 +38,9 @@ const SIDES: u32 = 8;
 /// Zones round found obstacles are named so, and no other is.
 pub const FOUND_PREFIX: &str = "found_";
 
+/// Whose word is remembered, at most.
+const AUTHORS_MAX: usize = 256;
+
 /// So many intervals it waits before it says what nobody who lives says, and at most so many more.
 const WAIT_INTERVALS: u64 = 2;
 const RANKS_MAX: u64 = 8;
@@ -132,8 +135,10 @@ impl KnownObstacles {
 
     /// Another says these; whether one of them is news.
     pub fn hear(&mut self, author: u16, told: &FoundObstacles) -> bool {
-        self.told
-            .insert(author, told.found.iter().copied().collect());
+        if self.told.len() < AUTHORS_MAX || self.told.contains_key(&author) {
+            let all = told.found.iter().copied().collect();
+            self.told.insert(author, all);
+        }
         let news = told.found.iter().map(|f| self.know(*f));
         news.fold(false, |any, one| any | one)
     }
