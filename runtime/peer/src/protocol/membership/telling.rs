@@ -95,8 +95,8 @@ impl Telling {
     /// knowing is reminded first (a quarter of the entries at most), then news (half of
     /// the rest at most), then those whom a neighbour is farther from than this peer (two
     /// thirds of the rest), then those `behind` whose records neighbours have newer (half of the
-    /// rest, of one entry every other time), then all in rotation, so that nobody is left out
-    /// for long. The relay fills in the versions of records.
+    /// rest, of one entry every other time; ground stations first), then all in
+    /// rotation, so that nobody is left out for long. The relay fills in the versions of records.
     pub(super) fn whole(
         &mut self,
         peers: &mut Peers,
@@ -135,10 +135,14 @@ impl Telling {
         );
         let in_turn = |next: u16| peers.range(next..).chain(peers.range(..next));
         let room = max - ids.len();
-        let asked = in_turn(self.next).map(|(id, _)| *id);
-        let asked = asked.filter(|id| behind.contains(id) && !ids.contains(id));
-        let asked: Vec<u16> = asked.take(self.for_those_behind(room)).collect();
-        ids.extend(asked);
+        let asked = in_turn(self.next);
+        let asked = asked.filter(|(id, _)| behind.contains(id) && !ids.contains(id));
+        let mut asked: Vec<(bool, u16)> =
+            asked.map(|(id, k)| (!k.info.ground_station, *id)).collect();
+        // What a ground station says others wait for.
+        asked.sort_by_key(|(is_uav, _)| *is_uav);
+        let room = self.for_those_behind(room);
+        ids.extend(asked.into_iter().take(room).map(|(_, id)| id));
         let rest: Vec<u16> = in_turn(self.next)
             .map(|(id, _)| *id)
             .filter(|id| !ids.contains(id))

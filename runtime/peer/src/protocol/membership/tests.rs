@@ -480,6 +480,30 @@ fn whose_records_neighbours_have_newer_is_told_of_soon() {
     assert_eq!(all, (2..=26).collect(), "nobody is left out");
 }
 
+/// Many differ in their states alone, a ground station in what others wait for.
+#[test]
+fn of_those_whose_records_neighbours_have_newer_ground_stations_go_first() {
+    let mut m = Membership::new(1, 1000);
+    for id in 2..=26 {
+        let said = Beacon {
+            ground_station: id == 26,
+            ..beacon(5, Vec::new())
+        };
+        m.on_beacon(Time(0), id, 1, &said);
+    }
+    no_news(&mut m);
+    let mut told = Vec::new();
+    for t in 0..60 {
+        let now = Time(3_000 + t * 1_000);
+        let (whole, _) = m.tell(now, 4, &(2..=26).collect());
+        told.push(whole[0].id);
+    }
+    let of_it = told.iter().filter(|id| **id == 26).count();
+    assert!((30..=33).contains(&of_it), "{told:?}");
+    let all: BTreeSet<u16> = told.iter().copied().collect();
+    assert_eq!(all, (2..=26).collect(), "nobody is left out");
+}
+
 /// Five others are neighbours; of two of them somebody else knows by more hops.
 #[test]
 fn those_whom_a_neighbour_is_farther_from_are_told_of_first() {
