@@ -17,9 +17,10 @@
 use crate::cooperation::Situation;
 use crate::effect::Effect;
 use crate::input::Time;
-use crate::mission::{FOUND_SHIFT, Mission, PointMm};
+use crate::mission::{Mission, PointMm};
 use crate::mission_edit::is_found;
 use crate::output::Status;
+use crate::revision::FOUND_SHIFT;
 use crate::wire::codec::Body;
 use crate::wire::obstacle::{AGAIN_MAX, FOUND_MAX, Found, FoundObstacles};
 use skein_behaviors::obstacle::{Obstacle, Obstacles};

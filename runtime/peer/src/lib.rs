@@ -24,7 +24,7 @@
 //! | [`journal`] | what is durable before it is spoken of |
 //! | [`offload`] | work that takes too long for a percept to wait |
 //! | [`wire`] | keys, kinds, messages, their bytes and limits |
-//! | [`mission`], `task`, [`cells`] | what is to be seen, and what was |
+//! | [`mission`], [`revision`], `task`, [`cells`] | what is to be seen, and what was |
 //! | [`found_obstacles`], `sensed_aircraft` | what UAVs sense and no map shows |
 //! | [`library`] | how a mission comes in pieces |
 //!
@@ -132,6 +132,7 @@ pub mod peer;
 pub mod protocol;
 mod registers;
 pub mod relay_circle;
+pub mod revision;
 mod sensed_aircraft;
 mod separation;
 mod sight;
