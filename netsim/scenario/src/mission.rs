@@ -16,7 +16,6 @@ use skein_interop::json::Error;
 use skein_netsim::spec::{ObstaclePlace, Spec};
 use skein_netsim::world::{intruders, unmapped};
 use skein_peer::diagram::DiagramError;
-use skein_peer::found_obstacles::MARGIN_DM;
 use skein_peer::mission::{mm, ring_mm};
 use skein_peer::wire::obstacle::Found;
 use skein_peer::wire::tasks::TaskKind;
@@ -248,14 +247,7 @@ pub(crate) fn check_obstacles(s: &Stated, spec: &Spec) -> Result<(), Error> {
                 ));
             }
         }
-        stated.insert(Found {
-            again: 0,
-            east_dm: mm(at.x) / 100,
-            north_dm: mm(at.y) / 100,
-            radius_dm: u16::try_from(mm(obstacle.radius_m) / 100)
-                .unwrap_or(u16::MAX)
-                .saturating_add(MARGIN_DM),
-        });
+        stated.insert(Found::of(&obstacle.standing(at)));
     }
     let Some(round) = mission.with_found(&stated) else {
         return Ok(());

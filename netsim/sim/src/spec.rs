@@ -5,6 +5,7 @@ use crate::pursuit::roads::Roads;
 use crate::pursuit::vehicle::Behaviour;
 use crate::twins::Twins;
 use crate::weather::Weather;
+use skein_behaviors::obstacle::Obstacle;
 use skein_flight::airframe::Airframe;
 use skein_flight::streets::Network;
 use skein_flight::trajectory::timed::Objective;
@@ -213,6 +214,18 @@ pub struct ObstacleSpec {
     pub radius_m: f64,
     /// Where it stands.
     pub place: ObstaclePlace,
+}
+
+impl ObstacleSpec {
+    /// It, where it stands there.
+    #[must_use]
+    pub fn standing(&self, at: Point) -> Obstacle {
+        Obstacle {
+            east_dm: mm(at.x) / 100,
+            north_dm: mm(at.y) / 100,
+            radius_dm: u16::try_from(mm(self.radius_m) / 100).unwrap_or(u16::MAX),
+        }
+    }
 }
 
 /// Where an obstacle stands.

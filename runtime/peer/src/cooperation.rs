@@ -224,6 +224,9 @@ impl Cooperation {
         let Some(newest) = newest.filter(|_| !percept.obstacles.is_absent()) else {
             return Effects::new();
         };
+        if self.obstacles.is_as_before(&percept.obstacles, &newest) {
+            return Effects::new();
+        }
         let is_news = self.obstacles.sense(&percept.obstacles, &newest);
         let mut effects = if is_news {
             self.fly_round_found()

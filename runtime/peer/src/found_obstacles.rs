@@ -46,6 +46,19 @@ const AUTHORS_MAX: usize = 256;
 const WAIT_INTERVALS: u64 = 2;
 const RANKS_MAX: u64 = 8;
 
+impl Found {
+    /// An obstacle as it is told, [`MARGIN_DM`] wider than it is sensed, found for the first time.
+    #[must_use]
+    pub fn of(sensed: &Obstacle) -> Self {
+        Self {
+            again: 0,
+            east_dm: sensed.east_dm,
+            north_dm: sensed.north_dm,
+            radius_dm: sensed.radius_dm.saturating_add(MARGIN_DM),
+        }
+    }
+}
+
 /// The name of the zone round one.
 #[must_use]
 pub fn zone_name(f: &Found) -> String {
@@ -70,8 +83,7 @@ pub fn zone_round(f: &Found) -> Vec<PointMm> {
 /// What it does with them, for a person.
 #[must_use]
 pub fn sentence(mission: &Mission) -> String {
-    let found = mission.added_zones.keys().filter(|name| is_found(name));
-    let n = found.count();
+    let n = mission.zones_round_found();
     let revision = mission.revision;
     format!("flies round {n} obstacles that are on no map, revision {revision}")
 }
@@ -89,6 +101,8 @@ pub(crate) struct KnownObstacles {
     untold_since: Option<Time>,
     /// Sensed, and kept clear of without a zone of the mission.
     heeded: Vec<Obstacle>,
+    /// What was sensed at the last look, and in which revision: nothing new comes of it again.
+    looked: Option<(Obstacles, u32)>,
 }
 
 impl KnownObstacles {
@@ -103,6 +117,12 @@ impl KnownObstacles {
         &self.known
     }
 
+    /// Whether the same was sensed at the last look, on the same mission.
+    pub fn is_as_before(&mut self, sensed: &Obstacles, mission: &Mission) -> bool {
+        let look = Some((*sensed, mission.revision));
+        core::mem::replace(&mut self.looked, look) == look
+    }
+
     /// The UAV senses these while this mission is the newest; whether one of them is news.
     pub fn sense(&mut self, sensed: &Obstacles, mission: &Mission) -> bool {
         let mut is_news = false;
@@ -114,9 +134,7 @@ impl KnownObstacles {
             }
             let found = Found {
                 again: alike.iter().map(|f| f.again + 1).max().unwrap_or(0),
-                east_dm: obstacle.east_dm,
-                north_dm: obstacle.north_dm,
-                radius_dm: obstacle.radius_dm.saturating_add(MARGIN_DM),
+                ..Found::of(obstacle)
             };
             if found.again <= AGAIN_MAX && found.is_valid() && self.know(found) {
                 self.sensed.insert(found);
@@ -160,6 +178,7 @@ impl KnownObstacles {
     /// Another executive flies, which keeps clear of the zones of its mission alone.
     pub fn heed_anew(&mut self) {
         self.heeded.clear();
+        self.looked = None;
     }
 
     /// Says what nobody else does.
@@ -201,6 +220,13 @@ fn is_within(inner: &Obstacle, outer: &Obstacle) -> bool {
 }
 
 impl Mission {
+    /// How many of its zones stand round what was found.
+    #[must_use]
+    pub fn zones_round_found(&self) -> usize {
+        let names = self.added_zones.keys();
+        names.filter(|name| is_found(name)).count()
+    }
+
     /// Whether an operator took out the zone round it.
     #[must_use]
     pub fn is_dismissed(&self, f: &Found) -> bool {
@@ -228,16 +254,17 @@ impl Mission {
     #[must_use]
     pub fn with_found(&self, found: &BTreeSet<Found>) -> Option<Self> {
         let room = self.room_for_found()?;
-        let lacks =
-            |f: &&Found| !self.added_zones.contains_key(&zone_name(f)) && !self.is_dismissed(f);
-        let new: Vec<&Found> = found.iter().filter(lacks).collect();
+        let named = found.iter().map(|f| (zone_name(f), f));
+        let is_there =
+            |name: &String| self.added_zones.contains_key(name) || self.dismissed.contains(name);
+        let new: Vec<(String, &Found)> = named.filter(|(name, _)| !is_there(name)).collect();
         let count = u32::try_from(new.len()).unwrap_or(u32::MAX);
         if count == 0 || count > room {
             return None;
         }
         let mut changed = self.clone();
         changed.revision += count << FOUND_SHIFT;
-        let zones = new.into_iter().map(|f| (zone_name(f), zone_round(f)));
+        let zones = new.into_iter().map(|(name, f)| (name, zone_round(f)));
         changed.added_zones.extend(zones);
         Some(changed)
     }

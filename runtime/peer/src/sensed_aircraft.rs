@@ -84,8 +84,8 @@ impl ToldAircraft {
         if s.now.since_ms(self.said_at) < pause_ms {
             return None;
         }
-        let seen: Vec<Aircraft> = percept.traffic.aircraft().copied().collect();
-        let seen: Vec<Aircraft> = seen.into_iter().take(SENSED_MAX).collect();
+        let nearest = percept.traffic.aircraft().take(SENSED_MAX);
+        let seen: Vec<Aircraft> = nearest.copied().collect();
         if seen.is_empty() {
             return None;
         }

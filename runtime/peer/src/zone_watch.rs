@@ -9,7 +9,7 @@
 //! | lie elsewhere | nothing, until the plan changes with the loop | nothing |
 
 use crate::effect::Effect;
-use crate::found_obstacles::{MARGIN_DM, zone_round};
+use crate::found_obstacles::zone_round;
 use crate::mission::{Mission, point_m};
 use crate::mission_state::MissionState;
 use crate::wire::obstacle::Found;
@@ -32,14 +32,8 @@ impl MissionState {
 
     /// What is sensed and is in no zone of the newest mission is kept clear of from now on.
     pub fn heed_obstacles(&mut self, newest: &Mission, sensed: &[Obstacle]) -> Option<Effect> {
-        let round = sensed.iter().map(|o| Found {
-            again: 0,
-            east_dm: o.east_dm,
-            north_dm: o.north_dm,
-            radius_dm: o.radius_dm.saturating_add(MARGIN_DM),
-        });
-        let round = round.filter_map(|f| {
-            let ring = zone_round(&f).into_iter().map(point_m);
+        let round = sensed.iter().filter_map(|o| {
+            let ring = zone_round(&Found::of(o)).into_iter().map(point_m);
             Polygon::new(ring.collect()).ok()
         });
         let zones = newest.zones_m().filter_map(|zone| Polygon::new(zone).ok());

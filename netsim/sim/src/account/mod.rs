@@ -51,7 +51,6 @@ use restarts::Restarts;
 use skein_link::RadioCounters;
 use skein_peer::Report;
 use skein_peer::input::AskedTask;
-use skein_peer::mission_edit::is_found;
 use skein_peer::output::{Status, TaskNews};
 use std::collections::{BTreeMap, BTreeSet};
 use tasks::{TaskReport, Tasks};
@@ -320,7 +319,7 @@ impl Account {
             Report::Detected { id, told } => (id.author == peer).then(|| told.sentence(id.author)),
             Report::Crowd { told } => (told.look.by == peer).then(|| told.sentence()),
             Report::Found { mission } => {
-                let found = mission.added_zones.keys().filter(|z| is_found(z)).count();
+                let found = mission.zones_round_found();
                 let is_more = found > self.obstacles_found;
                 self.obstacles_found = self.obstacles_found.max(found);
                 is_more.then(|| skein_peer::found_obstacles::sentence(mission))

@@ -11,7 +11,9 @@ use std::sync::Arc;
 impl Swarm {
     /// A peer begins a mission, or a lap of one.
     pub(super) fn mission_begun(&mut self, revision: u32, loop_hash: u64) {
-        if self.operator.mission().finds_obstacles && !self.is_judged_by(revision, loop_hash) {
+        let finds = self.operator.mission().finds_obstacles;
+        let is_beside = finds && !self.is_judged_by(revision, loop_hash);
+        if is_beside {
             let cache = &mut self.geometry_cache;
             // What others found at the same time has the same number.
             let is_flown = |m: &&Arc<Mission>| is_loop_of(cache, m, revision, loop_hash);
@@ -20,13 +22,13 @@ impl Swarm {
                 return;
             };
             self.judge_by_found(&other);
-            self.judged.forget();
             if !self.is_judged_by(revision, loop_hash) {
                 return;
             }
         }
         let given = self.operator.mission();
         let (cache, air) = (&mut self.geometry_cache, &self.air);
+        let given = (given, is_beside);
         if self.judged.begin(given, revision, loop_hash, (cache, air)) {
             self.checker.on_new_loop(loop_hash);
         }

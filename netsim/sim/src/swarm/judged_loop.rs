@@ -50,10 +50,11 @@ impl JudgedLoop {
     }
 
     /// A peer begins a revision. If it is of the mission given last, and nobody has begun it
-    /// before, cells are counted on its loop from now on. Returns whether that is another one.
+    /// before, or it is another one of that number, cells are counted on its loop from now on.
+    /// Returns whether that is another one.
     pub(super) fn begin(
         &mut self,
-        given: &Arc<Mission>,
+        (given, is_beside): (&Arc<Mission>, bool),
         revision: u32,
         loop_hash: u64,
         (cache, air): (&mut GeometryCache, &Air),
@@ -64,7 +65,7 @@ impl JudgedLoop {
             return false;
         };
         let lap = given.lap.saturating_add(laps);
-        if (given.revision, lap) <= (self.mission.revision, self.lap) {
+        if !is_beside && (given.revision, lap) <= (self.mission.revision, self.lap) {
             return false;
         }
         self.mission = Arc::clone(given);
@@ -78,15 +79,6 @@ impl JudgedLoop {
             self.refresh(air);
         }
         is_another
-    }
-
-    /// Another mission of the same number is begun next, if any is.
-    pub(super) fn forget(&mut self) {
-        self.lap = 0;
-        self.mission = Arc::new(Mission {
-            revision: 0,
-            ..(*self.mission).clone()
-        });
     }
 
     /// Marks what was seen since.

@@ -7,7 +7,7 @@
 use super::fact::{Collision, Fact};
 use super::obstacles::Place;
 use crate::geometry_cache::geometry_of;
-use crate::spec::{ObstaclePlace, ObstacleSpec, Spec};
+use crate::spec::{ObstaclePlace, Spec};
 use skein_behaviors::obstacle::Obstacle;
 use skein_flight::airframe::Airframe;
 use skein_geometry::frame::{Point, Vector};
@@ -140,12 +140,7 @@ fn stand(spec: &Spec, seed: u64) -> Vec<Obstacle> {
 
 /// Whether there is a mission round all of them.
 fn is_flown_round(mission: &Mission, all: &[Obstacle]) -> bool {
-    let found = all.iter().map(|o| Found {
-        again: 0,
-        east_dm: o.east_dm,
-        north_dm: o.north_dm,
-        radius_dm: o.radius_dm.saturating_add(MARGIN_DM),
-    });
+    let found = all.iter().map(Found::of);
     let round = mission.with_found(&found.collect());
     let geometry = round.map(|mission| geometry_of(&Arc::new(mission)));
     geometry.is_none_or(|g| g.is_ok_and(|g| g.base_is_clear().is_ok()))
@@ -158,13 +153,8 @@ fn placed(spec: &Spec, seed: u64) -> Vec<Obstacle> {
     let zones = NoFlyZones::new(zones.collect());
     let launches = spec.uavs.iter().map(|u| u.launch.position());
     let starts: Vec<Point> = launches.chain([point_m(mission.base)]).collect();
-    let of = |one: &ObstacleSpec, at: Point| Obstacle {
-        east_dm: super::mm(at.x) / 100,
-        north_dm: super::mm(at.y) / 100,
-        radius_dm: u16::try_from(super::mm(one.radius_m) / 100).unwrap_or(u16::MAX),
-    };
     let stated = spec.obstacles.iter().filter_map(|one| match one.place {
-        ObstaclePlace::At(at) => Some(of(one, at)),
+        ObstaclePlace::At(at) => Some(one.standing(at)),
         ObstaclePlace::Within { .. } => None,
     });
     let mut all: Vec<Obstacle> = stated.collect();
@@ -174,7 +164,7 @@ fn placed(spec: &Spec, seed: u64) -> Vec<Obstacle> {
             let drawn = (0..TRIES).map(|_| {
                 let (s, c) = sin_cos(TAU * random.unit());
                 let out_m = radius_m * random.unit().sqrt();
-                of(one, middle + Vector::new(c, s) * out_m)
+                one.standing(middle + Vector::new(c, s) * out_m)
             });
             let is_free = |o: &Obstacle| {
                 let (at, room_m) = (o.at(), o.radius_m() + 2.0 * turn_m);
@@ -192,6 +182,7 @@ fn placed(spec: &Spec, seed: u64) -> Vec<Obstacle> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spec::ObstacleSpec;
     use crate::world::fixture::square;
 
     fn world(places: &[ObstaclePlace], seed: u64) -> Unmapped {

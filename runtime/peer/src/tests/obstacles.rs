@@ -4,7 +4,6 @@ use super::with_operator;
 use crate::Input;
 use crate::input::Command;
 use crate::mission::{Mission, PointMm, mm};
-use crate::mission_edit::is_found;
 use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::wire::kinds::Kind;
 use skein_behaviors::obstacle::Obstacle;
@@ -44,8 +43,7 @@ fn square(east_m: f64, north_m: f64) -> Vec<PointMm> {
 
 /// Zones round what was found that a peer's mission has.
 fn zones_round_found(h: &Harness, id: u16) -> usize {
-    let mission = h.newest_mission(id).unwrap();
-    mission.added_zones.keys().filter(|z| is_found(z)).count()
+    h.newest_mission(id).unwrap().zones_round_found()
 }
 
 /// Whether these peers fly the same mission, and it has so many zones round what was found.
