@@ -245,6 +245,9 @@ fn a_simulated_run(r: &mut Readme) {
     let recorded = "skein sim helsinki --seed 1 --run-dir run";
     assert!(told(r.instead("skein sim [SCENARIO]", recorded)).contains("PASSED"));
     well(r.instead("skein sim", "skein sim --seed 2"));
+    for trial in ["skein sim airspace", "skein sim cranes"] {
+        assert!(told(r.exactly(trial)).contains("PASSED"));
+    }
     assert!(told(r.exactly("skein sim --why 3@120")).contains("uav3"));
     serves_a_page(r.exactly("skein sim helsinki --web"), true);
     well(r.instead("skein report RUN", "skein report run"));
