@@ -74,9 +74,9 @@ impl MissionState {
         (me, others): (&Hand, &[Hand]),
         by_ms: u64,
     ) -> Option<(u64, Vec<(u16, Direction)>)> {
-        let pace = self.pace()?;
-        let share = self.share_at_once(ctx);
-        let (begins_ms, cells) = sharing::nearest_orphans(&orphans.runs(), me, share, pace)?;
+        let (pace, share) = (self.pace()?, self.share_at_once(ctx));
+        let among = (orphans, self.covered());
+        let (begins_ms, cells) = sharing::nearest_orphans(among, me, share, pace, |_, _| true)?;
         let first = cells.first()?.0;
         let elsewhere = ctx.members.len().saturating_sub(others.len() + 1);
         let sooner = pace.how_many_sooner(me, (others, elsewhere), first);
@@ -107,6 +107,7 @@ impl MissionState {
             let (sooner, _) = pace.how_many_sooner(me, (&at_work, 0), first);
             self.negotiation.is_my_turn_at_last(ctx, first, sooner)
         };
+        let overdue = (overdue, self.covered());
         let mut taken = sharing::share_of_orphans(overdue, me, share, pace, is_my_turn);
         let all = taken.iter().flat_map(|(_, cells)| cells).copied().collect();
         let flown = self.flown_besides(all, u64::MAX, s.percept)?;
@@ -207,8 +208,8 @@ impl MissionState {
         self.negotiation.begin_nearest(&mine, way_ms)
     }
 
-    /// Of cells that are to be flown after the plan those that are flown by then, with enough
-    /// left for the way home, if any are.
+    /// Of cells that are to be flown after the plan those that a claim has room for and that are
+    /// flown by then, with enough left for the way home, if any are.
     fn flown_besides(
         &self,
         mut cells: Vec<(u16, Direction)>,
@@ -218,6 +219,7 @@ impl MissionState {
         let sections = &self.negotiation.sections;
         let mut plan = sections.plan().to_vec();
         plan.extend(sections.taken(&cells));
+        plan.truncate(sections.fitting(&plan));
         let legs = legs_of(&plan, sections.cells());
         let is_open = |c: u16| !sections.covered().contains(c);
         let executive = self.executive.as_ref()?;

@@ -480,8 +480,8 @@ impl Relay {
     /// What this peer bids and claims itself goes before all else, once: nobody else can say
     /// it; and so does that its mission is finished, which is so short that nothing waits for it.
     /// Sent again it waits its turn, or what this peer has seen would never be said.
-    /// Where many share the channel its coverage goes next: claims that others wrote and that
-    /// wait for longer than coverage lives would never let it go.
+    /// Its coverage goes next: nobody passes it on, and claims that others wrote and that wait for
+    /// longer than coverage lives would never let it go.
     fn standing(&self, key: &RecordKey, priority: Priority) -> Standing {
         let unsaid = || self.held.get(key).is_some_and(|h| h.copies == 0);
         let is_end = key.1 == Kind::Finished.number();
@@ -857,13 +857,12 @@ impl Relay {
 
     /// What goes next: it is its turn, or it can share the headers of what goes now.
     fn first(&self, now: Time) -> Option<(RecordKey, Priority)> {
-        let crowded = self.air.is_crowded();
-        if !crowded || !self.air.is_filling(now) {
-            return self.queue.turn(now, crowded).first;
+        if !self.air.is_crowded() || !self.air.is_filling(now) {
+            return self.queue.turn(now).first;
         }
         // What was sent a moment ago is sent again only for being later.
         let again = |k: &RecordKey, h: &Held| k.0 == self.me && h.copies > 0;
-        self.queue.first(now, crowded, |k| {
+        self.queue.first(now, |k| {
             let held = self.held.get(k).filter(|h| !again(k, h));
             held.is_some_and(|h| self.air.joins(now, h.bytes.len()))
         })
@@ -872,7 +871,7 @@ impl Relay {
     /// When [`Relay::poll`] may have something, if it ever will.
     #[must_use]
     pub fn next_timeout(&self, now: Time) -> Option<Time> {
-        let turn = self.queue.turn(now, self.air.is_crowded());
+        let turn = self.queue.turn(now);
         if turn.first.is_none() {
             return (self.queue.len() > 0).then_some(turn.next);
         }

@@ -8,7 +8,6 @@
 //! ([`super::sections`]). So what is computed here need not be the same everywhere, only
 //! nearly; nothing but the time of flight depends on it.
 
-use super::runs::cells_of;
 use crate::cells::CellSet;
 use crate::wire::message::CellRun;
 use skein_flight::coverage::ring::{CoverageLoop, Direction, LoopCell};
@@ -25,6 +24,11 @@ const RELIEF_PERCENT: u64 = 90;
 /// takes any before it is idle and the way is far, without an end one UAV takes what is flown
 /// when all others are done. Of 100, 150, 200, 250 and no end, 150 was best with 20 UAVs.
 const EVEN_PERCENT: u64 = 150;
+
+/// A run that is taken goes on over so many covered cells: to pass over them takes no longer than
+/// to turn to another run, and what is in one run is one listing of a claim, which has room for
+/// few.
+const BRIDGED_MAX: u16 = 4;
 
 /// Where a peer that has no section yet would come onto the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -310,33 +314,47 @@ pub fn relief(
     None
 }
 
-/// Of some orphaned cells the run that this peer reaches soonest from where it will be free,
-/// at most `most` cells from its nearer end on, and how long the way is, milliseconds.
+/// Of some orphaned cells the run that this peer reaches soonest from where it will be free, of
+/// those that it is to begin with, at most `most` cells from its nearer end on, and when it would
+/// begin, milliseconds from now. A run goes on over a few cells that are covered.
 #[must_use]
 pub fn nearest_orphans(
-    runs: &[CellRun],
+    (orphans, covered): (&CellSet, &CellSet),
     hand: &Hand,
     most: u16,
     pace: Pace<'_>,
-) -> Option<(u64, Vec<(u16, Direction)>)> {
-    let cells = u16::try_from(pace.coverage_loop.len()).ok()?;
-    let both_ways = |run: &CellRun| {
-        let ahead: Vec<u16> = cells_of(*run, cells).collect();
+    is_my_turn: impl Fn(&Hand, u16) -> bool,
+) -> Option<Taken> {
+    let both_ways = |ahead: Vec<u16>| {
         let back = ahead.iter().rev().copied().collect();
-        let first = run.first;
-        [
-            (first, Direction::Forward, ahead),
-            (first, Direction::Backward, back),
-        ]
+        [(Direction::Forward, ahead), (Direction::Backward, back)]
     };
-    let with_way = |(first, direction, flown): (u16, Direction, Vec<u16>)| {
-        let way_ms = hand.free_ms + pace.way_ms(hand.at, *flown.first()?);
+    let with_way = |(direction, flown): (Direction, Vec<u16>)| {
+        let first = *flown.first()?;
+        let way_ms = hand.free_ms + pace.way_ms(hand.at, first);
         Some((way_ms, first, direction, flown))
     };
-    let ways = runs.iter().flat_map(both_ways).filter_map(with_way);
-    let (way_ms, _, direction, flown) = ways.min_by_key(|(ms, first, d, _)| (*ms, *first, *d))?;
+    let runs = bridged_runs(orphans, covered).into_iter();
+    let ways = runs.flat_map(both_ways).filter_map(with_way);
+    let mine = ways.filter(|(_, first, ..)| is_my_turn(hand, *first));
+    let (way_ms, _, direction, flown) = mine.min_by_key(|(ms, first, d, _)| (*ms, *first, *d))?;
     let taken = flown.into_iter().take(usize::from(most.max(1)));
     Some((way_ms, taken.map(|cell| (cell, direction)).collect()))
+}
+
+/// Runs of cells, each going on over at most [`BRIDGED_MAX`] covered ones.
+fn bridged_runs(cells: &CellSet, covered: &CellSet) -> Vec<Vec<u16>> {
+    let is_bridged = |from: u16, to: u16| {
+        to - from <= BRIDGED_MAX + 1 && (from + 1..to).all(|cell| covered.contains(cell))
+    };
+    let mut runs: Vec<Vec<u16>> = Vec::new();
+    for cell in cells.iter() {
+        match runs.last_mut() {
+            Some(run) if run.last().is_some_and(|last| is_bridged(*last, cell)) => run.push(cell),
+            _ => runs.push(vec![cell]),
+        }
+    }
+    runs
 }
 
 /// A run that is taken, in the order in which it is flown, and when that begins, milliseconds from
@@ -344,11 +362,11 @@ pub fn nearest_orphans(
 pub type Taken = (u64, Vec<(u16, Direction)>);
 
 /// Of some orphaned cells as many runs as make a share, at most `share` cells: each the nearest
-/// from where the one before ends, until it is not the turn of this peer, as it will be then, to
-/// take one that begins with this cell.
+/// from where the one before ends, of those that it is this peer's turn to take, as it will be
+/// then.
 #[must_use]
 pub fn share_of_orphans(
-    mut orphans: CellSet,
+    (mut orphans, covered): (CellSet, &CellSet),
     hand: &Hand,
     share: u16,
     pace: Pace<'_>,
@@ -356,9 +374,8 @@ pub fn share_of_orphans(
 ) -> Vec<Taken> {
     let (mut hand, mut left, mut taken) = (*hand, share, Vec::new());
     while left > 0
-        && let Some((begins_ms, cells)) = nearest_orphans(&orphans.runs(), &hand, left, pace)
-        && let Some((first, _)) = cells.first()
-        && is_my_turn(&hand, *first)
+        && let Some((begins_ms, cells)) =
+            nearest_orphans((&orphans, covered), &hand, left, pace, &is_my_turn)
     {
         for (cell, _) in &cells {
             orphans.remove(*cell);
@@ -566,21 +583,50 @@ mod tests {
     #[test]
     fn orphans_are_taken_from_their_nearer_end() {
         with_loop(|pace| {
-            let runs = [
-                CellRun { first: 4, count: 5 },
-                CellRun {
-                    first: 22,
-                    count: 4,
-                },
-            ];
+            let nothing = CellSet::new(24);
+            let orphans = CellSet::of(24, [4, 5, 6, 7, 8, 20, 21, 22, 23]);
+            let nearest = |at, most, covered: &CellSet| {
+                nearest_orphans(
+                    (&orphans, covered),
+                    &hand(pace, 1, at),
+                    most,
+                    pace,
+                    |_, _| true,
+                )
+            };
+            let backward = |cells: &[u16]| -> Vec<(u16, Direction)> {
+                let flown = cells.iter().map(|cell| (*cell, Direction::Backward));
+                flown.collect()
+            };
+            let taken = nearest(8, 3, &nothing);
+            assert_eq!(taken, Some((8000, backward(&[8, 7, 6]))));
+            let (_, cells) = nearest(20, 9, &nothing).unwrap();
+            assert_eq!(cells, [20, 21, 22, 23].map(|c| (c, Direction::Forward)));
+            let none = (&nothing, &nothing);
             let me = hand(pace, 1, 8);
-            let (way_ms, cells) = nearest_orphans(&runs, &me, 3, pace).unwrap();
-            let wanted = [8, 7, 6].map(|c| (c, Direction::Backward));
-            assert_eq!((way_ms, cells), (8000, wanted.to_vec()));
-            let me = hand(pace, 1, 22);
-            let (_, cells) = nearest_orphans(&runs, &me, 9, pace).unwrap();
-            assert_eq!(cells, [22, 23, 0, 1].map(|c| (c, Direction::Forward)));
-            assert_eq!(nearest_orphans(&[], &me, 9, pace), None);
+            assert_eq!(nearest_orphans(none, &me, 9, pace, |_, _| true), None);
+            // Only what it is to begin with.
+            let far = |_: &Hand, first: u16| first >= 20;
+            let (_, cells) = nearest_orphans((&orphans, &nothing), &me, 9, pace, far).unwrap();
+            assert!(cells.iter().all(|(cell, _)| *cell >= 20));
+        });
+    }
+
+    #[test]
+    fn a_run_of_orphans_goes_on_over_a_few_covered_cells() {
+        with_loop(|pace| {
+            let orphans = CellSet::of(24, [2, 3, 5, 10, 16]);
+            let covered = CellSet::of(24, [4, 6, 7, 8, 9, 11, 12, 13, 14, 15]);
+            let runs = |covered: &CellSet| bridged_runs(&orphans, covered);
+            assert_eq!(runs(&covered), [vec![2, 3, 5, 10], vec![16]]);
+            let nothing = CellSet::new(24);
+            assert_eq!(runs(&nothing), [vec![2, 3], vec![5], vec![10], vec![16]]);
+            // Between them is one that somebody else lists.
+            let but_one = CellSet::of(24, [4, 6, 7, 9]);
+            assert_eq!(runs(&but_one), [vec![2, 3, 5], vec![10], vec![16]]);
+            let me = hand(pace, 1, 2);
+            let taken = nearest_orphans((&orphans, &covered), &me, 3, pace, |_, _| true);
+            assert_eq!(taken.unwrap().1, [2, 3, 5].map(|c| (c, Direction::Forward)));
         });
     }
 
@@ -588,9 +634,11 @@ mod tests {
     fn as_many_runs_are_taken_at_once_as_make_a_share() {
         with_loop(|pace| {
             let orphans = CellSet::of(24, [4, 5, 8, 12, 13, 14, 20]);
+            let nothing = CellSet::new(24);
             let me = hand(pace, 1, 8);
             let share = |most, is_my_turn: &dyn Fn(&Hand, u16) -> bool| {
-                share_of_orphans(orphans.clone(), &me, most, pace, is_my_turn)
+                let orphans = (orphans.clone(), &nothing);
+                share_of_orphans(orphans, &me, most, pace, is_my_turn)
             };
             let cells = |taken: &[Taken]| -> Vec<u16> {
                 let all = taken.iter().flat_map(|(_, run)| run);
@@ -605,9 +653,11 @@ mod tests {
             // One that begins later is nobody's sooner than it is.
             assert!(all[1].0 >= all[0].0 + pace.cell_ms(8));
             assert_eq!(cells(&share(3, &|_, _| true)), cells(&all)[..3]);
-            // It ends where it is another's turn.
-            let second = all[1].1[0].0;
-            assert_eq!(cells(&share(24, &|_, first| first != second)), [8]);
+            // What is another's turn is left to that one, and what is farther is taken.
+            let second: Vec<u16> = all[1].1.iter().map(|(cell, _)| *cell).collect();
+            let others = cells(&share(24, &|_, first| !second.contains(&first)));
+            assert_eq!(others.len() + second.len(), 7);
+            assert!(others.iter().all(|cell| !second.contains(cell)));
             assert!(share(0, &|_, _| true).is_empty());
         });
     }

@@ -9,25 +9,15 @@ use std::collections::BTreeMap;
 /// Most transmissions waiting: all records of one neighbourhood once.
 pub const MAX_QUEUE: usize = 128;
 
-/// Whether a record goes before what is due sooner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Whether a record goes before what is due sooner: those that do come first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Standing {
     /// Nobody else can say it, and it was not said yet.
     First,
-    /// This peer's coverage: it goes before the rest where many share the channel.
+    /// This peer's coverage.
     Coverage,
     /// Its turn comes when it is due.
     Due,
-}
-
-impl Standing {
-    fn rank(self, crowded: bool) -> u8 {
-        match self {
-            Self::First => 0,
-            Self::Coverage if crowded => 1,
-            Self::Coverage | Self::Due => 2,
-        }
-    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +37,6 @@ pub(super) struct Turn {
     pub(super) first: Option<(RecordKey, Priority)>,
     /// When the random time of another one is over.
     pub(super) next: Time,
-    crowded: bool,
 }
 
 /// The queue of a relay: one entry per key.
@@ -179,15 +168,13 @@ impl Queue {
     }
 
     /// Asked for with every input, and looked up among all only after something changed.
-    pub(super) fn turn(&self, now: Time, crowded: bool) -> Turn {
-        let known = self.turn.get();
-        let known = known.filter(|t| now < t.next && t.crowded == crowded);
+    pub(super) fn turn(&self, now: Time) -> Turn {
+        let known = self.turn.get().filter(|t| now < t.next);
         let turn = known.unwrap_or_else(|| {
             let later = self.waiting.values().map(|w| w.from).filter(|t| *t > now);
             Turn {
-                first: self.first(now, crowded, |_| false),
+                first: self.first(now, |_| false),
                 next: later.min().unwrap_or(Time(u64::MAX)),
-                crowded,
             }
         });
         self.turn.set(Some(turn));
@@ -198,12 +185,11 @@ impl Queue {
     pub(super) fn first(
         &self,
         now: Time,
-        crowded: bool,
         rides: impl Fn(&RecordKey) -> bool,
     ) -> Option<(RecordKey, Priority)> {
         let may_go = |(k, w): &(&RecordKey, &Waiting)| w.from <= now || rides(k);
         let goes = self.waiting.iter().filter(may_go);
-        goes.min_by_key(|(k, w)| (w.from > now, w.standing.rank(crowded), w.due, **k))
+        goes.min_by_key(|(k, w)| (w.from > now, w.standing, w.due, **k))
             .map(|(k, w)| (*k, w.priority))
     }
 }
@@ -241,10 +227,9 @@ mod tests {
                 _ => queue.expire(now),
             }
             full += usize::from(queue.len() == MAX_QUEUE);
-            let crowded = below(50) == 0;
             kept += u32::from(queue.turn.get().is_some());
-            let turn = queue.turn(now, crowded);
-            assert_eq!(turn.first, queue.first(now, crowded, |_| false));
+            let turn = queue.turn(now);
+            assert_eq!(turn.first, queue.first(now, |_| false));
             let later = queue.waiting.values().map(|w| w.from);
             let next = later.filter(|from| *from > now).min();
             assert_eq!(turn.next, next.unwrap_or(Time(u64::MAX)));
