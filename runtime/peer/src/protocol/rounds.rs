@@ -98,7 +98,7 @@ impl Rounds {
         self.since_revision = revision;
     }
 
-    /// A period begins, in which no honest round waits for longer than this.
+    /// A period begins, in which rounds of others are waited for no longer than this.
     pub fn new_period(&mut self, longest_wait_ms: u32) {
         self.may_rise = COUNTER_STEP;
         self.longest_wait_ms = longest_wait_ms;
@@ -124,12 +124,10 @@ impl Rounds {
     /// # Errors
     /// Why it is none that an honest peer opens.
     pub fn believe(&mut self, round: &Round) -> Result<(), &'static str> {
-        if !self.hear_counter(round.counter) {
-            Err("a round that is far ahead of all that was heard of")
-        } else if round.wait_ms > self.longest_wait_ms {
-            Err("a round that waits for longer than any diameter needs")
-        } else {
+        if self.hear_counter(round.counter) {
             Ok(())
+        } else {
+            Err("a round that is far ahead of all that was heard of")
         }
     }
 
@@ -156,9 +154,11 @@ impl Rounds {
         if self.closed.is_some_and(|c| order <= c) {
             return HeardBid::Nothing;
         }
+        // Its author may take somebody slow for alive whom this peer holds for down.
+        let wait_ms = round.wait_ms.min(self.longest_wait_ms);
         match &mut self.open {
             Some(open) if order_of(&open.round) == order => {
-                open.round.wait_ms = open.round.wait_ms.max(round.wait_ms);
+                open.round.wait_ms = open.round.wait_ms.max(wait_ms);
                 self.silent.remove(&author);
                 match open.bids.entry(author.id) {
                     std::collections::btree_map::Entry::Occupied(_) => HeardBid::Nothing,
@@ -172,10 +172,11 @@ impl Rounds {
             _ => {
                 self.silent.remove(&author);
                 let bids = BTreeMap::from([(author.id, bid.clone())]);
-                self.open = Some(OpenRound {
-                    round: round.clone(),
-                    bids,
-                });
+                let round = Round {
+                    wait_ms,
+                    ..round.clone()
+                };
+                self.open = Some(OpenRound { round, bids });
                 HeardBid::BidWanted
             }
         }
@@ -462,12 +463,18 @@ mod tests {
         a.close();
         let mut slow = round(mine.counter + 1, &[1, 2]);
         slow.wait_ms = 9001;
-        assert!(matches!(
-            a.hear(member(2), &bid(&slow, 2)),
-            HeardBid::Refused(_)
-        ));
-        slow.wait_ms = 9000;
         assert_eq!(a.hear(member(2), &bid(&slow, 2)), HeardBid::BidWanted);
+        assert_eq!(a.open().unwrap().round.wait_ms, 9000);
+        // Nor does a later bid of it make anybody wait.
+        let mut slower = bid(&slow, 3);
+        slower.round.wait_ms = u32::MAX;
+        let mut three = Rounds::new(member(1), mine.counter);
+        three.new_period(9000);
+        slow.members.push(member(3));
+        slower.round.members.push(member(3));
+        assert_eq!(three.hear(member(2), &bid(&slow, 2)), HeardBid::BidWanted);
+        assert_eq!(three.hear(member(3), &slower), HeardBid::Added);
+        assert_eq!(three.open().unwrap().round.wait_ms, 9000);
     }
 
     /// A round that is complete in the eyes of its first member.

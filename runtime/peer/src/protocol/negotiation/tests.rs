@@ -492,9 +492,9 @@ fn a_new_life_owns_nothing_and_keeps_what_is_covered() {
 }
 
 #[test]
-fn a_round_may_wait_for_four_times_what_the_largest_diameter_needs_and_no_longer() {
-    let mut desk = Desk::new(&[2]);
-    let mut believe = |wait_ms| {
+fn a_round_is_waited_for_at_most_four_times_as_long_as_the_largest_diameter_needs() {
+    let waits = |wait_ms| {
+        let mut desk = Desk::new(&[2]);
         let round = Round {
             counter: 1,
             members: vec![member(1), member(2)],
@@ -503,11 +503,13 @@ fn a_round_may_wait_for_four_times_what_the_largest_diameter_needs_and_no_longer
             repair: true,
             wait_ms,
         };
-        desk.negotiation.rounds.believe(&round)
+        let heard = desk.negotiation.hear_bid(desk.now, member(2), &samples::bid(round));
+        heard.unwrap();
+        desk.round().wait_ms
     };
     // (2 · 16 + 3) T, doubled twice.
-    assert!(believe(140_000).is_ok());
-    assert!(believe(140_001).is_err());
+    assert_eq!(waits(140_000), 140_000);
+    assert_eq!(waits(140_001), 140_000);
 }
 
 #[test]
