@@ -39,6 +39,8 @@ pub(super) struct Home {
     /// From each boundary of the loop, with a turn at each end, milliseconds; none where there
     /// is no way.
     each_ms: Vec<Option<u32>>,
+    /// Whether there is a way from each of them.
+    from_everywhere: bool,
     /// A turn at each end, milliseconds.
     turns_ms: u32,
     /// The way last looked for off the loop: from where, and what it takes.
@@ -51,6 +53,7 @@ impl Home {
             at,
             ways,
             each_ms: Vec::new(),
+            from_everywhere: true,
             turns_ms: 0,
             off_loop: Cell::default(),
         };
@@ -62,6 +65,7 @@ impl Home {
         let turns_s = turns_s(transit);
         let each_s = self.ways.each_s(transit).into_iter();
         self.each_ms = each_s.map(|s| known_ms(s + turns_s)).collect();
+        self.from_everywhere = self.each_ms.iter().all(Option::is_some);
         self.turns_ms = known_ms(turns_s).unwrap_or(UNREACHABLE_MS);
         self.off_loop.take();
         self
@@ -296,6 +300,10 @@ impl Executive {
     /// Open cells, at an end of which there is no way home.
     #[must_use]
     pub fn n_without_way_home(&self, is_open: &dyn Fn(u16) -> bool) -> usize {
+        // Asked for with each percept, and there are ways nearly always.
+        if self.home.as_ref().is_none_or(|home| home.from_everywhere) {
+            return 0;
+        }
         let has_none = |cell: &u16| {
             BOTH.into_iter()
                 .any(|d| self.home_from_ms(self.transit.exit(*cell, d)).is_none())

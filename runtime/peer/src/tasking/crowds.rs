@@ -45,7 +45,7 @@ impl Tasking {
     /// Tells what is to be told of the event: of a ground station what nobody else does.
     pub(super) fn tell_of_event(&mut self, s: &Situation<'_>, state: &MissionState) -> Effects {
         self.gathering.follow(&state.geometry.mission);
-        if !s.speaks {
+        if !s.speaks || state.geometry.mission.crowd.is_none() {
             return Effects::new();
         }
         let (mut uavs, mut rank) = (1, 0);

@@ -503,7 +503,9 @@ fn a_round_is_waited_for_at_most_four_times_as_long_as_the_largest_diameter_need
             repair: true,
             wait_ms,
         };
-        let heard = desk.negotiation.hear_bid(desk.now, member(2), &samples::bid(round));
+        let heard = desk
+            .negotiation
+            .hear_bid(desk.now, member(2), &samples::bid(round));
         heard.unwrap();
         desk.round().wait_ms
     };
