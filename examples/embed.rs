@@ -161,6 +161,7 @@ impl Uav {
             launch_ready: false,
             failsafe: false,
             circles_per_m: None,
+            circles_in_ms: 0,
             traffic: Traffic::default(),
             obstacles: Obstacles::default(),
             sightings: Sightings::default(),

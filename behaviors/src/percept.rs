@@ -39,10 +39,14 @@ pub struct Percept {
     pub launch_ready: bool,
     /// Whether the airframe flies its own failsafe loiter for want of setpoints.
     pub failsafe: bool,
-    /// The circle that it flies for want of setpoints because others were promised it: its
+    /// The circle in which it ends for want of setpoints because others were promised it: its
     /// curvature, 1/m, positive to the left.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub circles_per_m: Option<f64>,
+    /// For how long it flies the way there that others were promised, milliseconds; 0 on the
+    /// circle, and where there is none.
+    #[serde(default)]
+    pub circles_in_ms: u32,
     /// Other UAVs that it senses.
     #[serde(default, skip_serializing_if = "Traffic::is_absent")]
     pub traffic: Traffic,

@@ -49,6 +49,7 @@ pub fn percept_at(pose: Pose, time_ms: u64) -> Percept {
         launch_ready: false,
         failsafe: false,
         circles_per_m: None,
+        circles_in_ms: 0,
         traffic: crate::traffic::Traffic::default(),
         obstacles: crate::obstacle::Obstacles::default(),
         sightings: crate::sightings::Sightings::default(),

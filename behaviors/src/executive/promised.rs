@@ -143,6 +143,18 @@ impl Executive {
             .is_some_and(|c| core::mem::replace(&mut c.imposed, false))
     }
 
+    /// Whether the airframe still flies what others were promised before this computer began
+    /// anew: it knows neither that way nor whom it keeps clear of, so it lets it be flown to the
+    /// circle at its end, which the percept tells.
+    #[must_use]
+    pub fn leaves_alone(&self, percept: &Percept) -> bool {
+        let begins = self
+            .contingency
+            .as_ref()
+            .is_some_and(|c| c.schedule.is_none());
+        begins && percept.failsafe && percept.circles_in_ms > 0
+    }
+
     /// Answers a percept as [`Executive::step`] does, on what is in force alone.
     pub(super) fn step_promised(
         &mut self,
@@ -231,7 +243,8 @@ impl Executive {
             boundary: None,
         };
         // Where its airframe flies a circle that others were promised, that stays.
-        let promised_per_m = percept.circles_per_m.filter(|_| percept.failsafe);
+        let on_circle = percept.failsafe && percept.circles_in_ms == 0;
+        let promised_per_m = percept.circles_per_m.filter(|_| on_circle);
         let bend_per_m = promised_per_m.unwrap_or_else(|| match self.transit.stay(&at) {
             Move::Loiter(circle) => circle.curvature_per_m,
             _ => 1.0 / self.circle_radius_m(),

@@ -307,6 +307,9 @@ impl Cooperation {
         let Some(executive) = &mut state.executive else {
             return effects;
         };
+        if executive.leaves_alone(percept) {
+            return effects;
+        }
         executive.expect_cells(expects_cells);
         let is_open = |c: u16| !sections.covered().contains(c);
         let (mut setpoint, events) = executive.step(percept, &is_open);

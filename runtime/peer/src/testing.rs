@@ -192,6 +192,7 @@ impl Seat {
             launch_ready: false,
             failsafe: false,
             circles_per_m: None,
+            circles_in_ms: 0,
             traffic: Traffic::default().with_aircraft(self.aircraft_at(now_ms)),
             obstacles: Obstacles::new(self.obstacles.iter().copied().filter(|o| {
                 (o.at() - self.pose.position()).norm() - o.radius_m() < OBSTACLE_RANGE_M

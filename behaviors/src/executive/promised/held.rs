@@ -6,6 +6,7 @@
 //! | its computer stood still, and the airframe flew on as was promised | what is left of that |
 //! | the same, before the first percept | nothing; it is foretold from where it is by now |
 //! | the same, and the airframe is elsewhere | a circle from here, imposed |
+//! | a computer begins anew in an airframe that is on its promised way | nothing: it goes on by itself |
 //! | a computer begins anew in an airframe that flies the promised circle | that circle, imposed |
 //! | another loop or other zones | what is in force; everything after what cannot be changed any more is asked for anew |
 //! | another airspeed by the new mission | a circle from here, imposed |

@@ -511,6 +511,13 @@ fn a_computer_that_begins_anew_flies_on_the_circle_of_its_airframe() {
         circles_per_m: Some(-1.0 / circle_m),
         ..flight.wing.percept()
     };
+    // On the way there it does nothing.
+    let under_way = Percept {
+        circles_in_ms: 1,
+        ..percept
+    };
+    assert!(flight.executive.leaves_alone(&under_way));
+    assert!(!flight.executive.leaves_alone(&percept));
     let _ = flight.executive.step(&percept, &|_| true);
     assert!(flight.executive.take_imposed());
     let End::Loiter { radius_mm, .. } = flight.executive.in_force(percept.time_ms).unwrap().end
@@ -518,4 +525,6 @@ fn a_computer_that_begins_anew_flies_on_the_circle_of_its_airframe() {
         panic!("no circle");
     };
     assert_eq!(radius_mm, -31_000);
+    // Of what it flies itself it knows the way.
+    assert!(!flight.executive.leaves_alone(&under_way));
 }

@@ -448,6 +448,8 @@ impl World {
             && let Some(u) = self.uavs.get_mut(seat)
         {
             launchers.tell(now_ms, u, &setpoint);
+            // Its launcher took it: nothing flies yet.
+            return true;
         }
         let Some(u) = self.uavs.get_mut(seat) else {
             return false;

@@ -89,6 +89,7 @@ impl Scene {
                 launch_ready: false,
                 failsafe: false,
                 circles_per_m: None,
+                circles_in_ms: 0,
                 traffic: skein_behaviors::traffic::Traffic::default(),
                 obstacles: skein_behaviors::obstacle::Obstacles::default(),
                 sightings: skein_behaviors::sightings::Sightings::new(sighted),

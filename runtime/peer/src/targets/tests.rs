@@ -40,6 +40,7 @@ fn percept(now_ms: u64, at: Point, seen: &[(f64, f64, u8)]) -> Percept {
         launch_ready: false,
         failsafe: false,
         circles_per_m: None,
+        circles_in_ms: 0,
         traffic: skein_behaviors::traffic::Traffic::default(),
         obstacles: skein_behaviors::obstacle::Obstacles::default(),
     }

@@ -86,6 +86,7 @@ fn percept(time_ms: u64, at: Point) -> Percept {
         launch_ready: false,
         failsafe: false,
         circles_per_m: None,
+        circles_in_ms: 0,
         traffic: skein_behaviors::traffic::Traffic::default(),
         obstacles: skein_behaviors::obstacle::Obstacles::default(),
         sightings: skein_behaviors::sightings::Sightings::new([]),

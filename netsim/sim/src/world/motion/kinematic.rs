@@ -313,7 +313,10 @@ impl Kinematic {
             takes_off_in_ms: 0,
             launch_ready: false,
             failsafe: self.failsafe,
-            circles_per_m: self.circles_per_m(),
+            circles_per_m: self.unattended().and_then(Promised::circle_per_m),
+            circles_in_ms: self
+                .unattended()
+                .map_or(0, |p| p.circles_in_ms(self.now_ms)),
             traffic: skein_behaviors::traffic::Traffic::default(),
             obstacles: skein_behaviors::obstacle::Obstacles::default(),
             sightings: skein_behaviors::sightings::Sightings::default(),
@@ -356,10 +359,9 @@ impl Kinematic {
         self.promised = Promised::of(setpoint);
     }
 
-    /// The promised circle, if it flies that for want of setpoints.
-    fn circles_per_m(&self) -> Option<f64> {
-        let promised = self.promised.as_ref().filter(|_| self.failsafe)?;
-        promised.circles_per_m(self.now_ms)
+    /// What others were promised, if it flies that for want of setpoints.
+    fn unattended(&self) -> Option<&Promised> {
+        self.promised.as_ref().filter(|_| self.failsafe)
     }
 
     /// Whether the last setpoint that it took still flies it.

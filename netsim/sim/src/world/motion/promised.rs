@@ -47,10 +47,22 @@ impl Promised {
         (rate_radps, wanted.airspeed_mps, self.until_ms)
     }
 
-    /// The circle that is flown at a time, 1/m, positive to the left; none on the way there.
-    pub fn circles_per_m(&self, at_ms: u64) -> Option<f64> {
-        let begun = seconds(at_ms) >= self.motion.ends_at_s();
-        begun.then(|| self.motion.loiter_per_m()).flatten()
+    /// The circle in which it ends, 1/m, positive to the left.
+    pub fn circle_per_m(&self) -> Option<f64> {
+        self.motion.loiter_per_m()
+    }
+
+    /// How long after this time it begins, milliseconds.
+    pub fn circles_in_ms(&self, at_ms: u64) -> u32 {
+        let left_s = self.motion.ends_at_s() - seconds(at_ms);
+        let left_s = left_s.max(0.0);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "not below 0, and above what fits it is as much as that"
+        )]
+        let left_ms = (left_s * 1e3).ceil() as u32;
+        left_ms
     }
 }
 
@@ -110,11 +122,17 @@ mod tests {
             assert!(off_m < 1.0, "{off_m} m off at {at_ms} ms");
             let seen = k.percept().unwrap();
             assert_eq!(seen.failsafe, at_ms >= 1_000);
-            let on_it = seen
+            let ends_on_it = seen
                 .circles_per_m
                 .is_some_and(|c| (c - 1.0 / 28.0).abs() < 1e-9);
-            assert_eq!(on_it, at_ms >= 7_693, "{at_ms}");
-            circled += usize::from(on_it);
+            assert_eq!(ends_on_it, seen.failsafe);
+            let left_ms = if ends_on_it {
+                7_693u64.saturating_sub(at_ms)
+            } else {
+                0
+            };
+            assert_eq!(u64::from(seen.circles_in_ms), left_ms, "{at_ms}");
+            circled += usize::from(ends_on_it && left_ms == 0);
         }
         assert!(circled > 200);
         other.advance(119_500, &mut Vec::new());
