@@ -1,6 +1,7 @@
 //! The default mission with all UAVs at one height, against the same with heights of their own.
 
 use skein_netsim::Prepared;
+use skein_netsim::fault::{Fault, TimedFault};
 use skein_netsim::runs::{Wanted, failure_free_makespan_ms, faults_of, run};
 
 /// One after the other, as far apart as they need.
@@ -59,6 +60,30 @@ fn who_took_off_at_one_place_keep_apart_in_storms() {
 #[test]
 fn who_began_in_the_air_keep_apart_in_storms() {
     keeps_apart_in_storms("launch: \"spread\"", &[7011, 7031, 7039, 7042]);
+}
+
+/// Each loses its computer on the way between two circles, and has it back three seconds later,
+/// with an empty disk: what others were promised is flown all the same.
+#[test]
+fn whose_computer_begins_anew_on_its_way_keep_apart() {
+    let prepared = mission("launch: \"base\"", "separation_m: 30,", 1_000_000);
+    for seed in 1..6 {
+        let restarts = (1..=8u16).flat_map(|peer| {
+            let at_ms = 8_000 + 9_000 * u64::from(peer) + 1_300 * seed;
+            let restart = Fault::Restart {
+                peer,
+                fresh_disk: true,
+            };
+            [
+                (at_ms, Fault::KillComputer { peer }),
+                (at_ms + 3_000, restart),
+            ]
+        });
+        let faults = restarts.map(|(at_ms, fault)| TimedFault { at_ms, fault });
+        let outcome = run(&prepared, seed, faults.collect(), Wanted::default());
+        let broken = outcome.violations();
+        assert!(outcome.report.passed, "{seed}: {broken:?}");
+    }
 }
 
 /// By agreement, and by heights of their own: the mean of some seeds, seconds.
