@@ -18,6 +18,7 @@
 //! | another mission, other zones | what is in force stays; what is on offer is withdrawn |
 
 mod held_up;
+mod identity;
 mod passing;
 mod silence;
 #[cfg(test)]
@@ -27,10 +28,12 @@ use crate::effect::{Effect, Effects};
 use crate::input::Time;
 use crate::protocol::conflict::{Apart, Conflicts, InTheWay, Intent, Reach};
 use crate::protocol::promises::Brief;
+use crate::why::Agreed;
 use crate::wire::codec::Body;
 use crate::wire::message::{Member, Record};
 use crate::{Incarnation, PeerId};
 use held_up::HeldUp;
+use identity::{Identity, shown};
 use passing::{Gist, Passing};
 use silence::{Silence, ends_ms};
 use skein_behaviors::executive::promised::{CIRCLE_RADII, Extension, PROMISED_MOST_S};
@@ -112,6 +115,7 @@ pub(crate) struct Separation {
     down_since: BTreeMap<u16, Time>,
     passing: Passing,
     held_up: HeldUp,
+    identity: Identity,
     silence: Silence,
     /// When others were heard last, milliseconds of the common clock.
     heard_ms: BTreeMap<u16, u64>,
@@ -138,6 +142,7 @@ impl Separation {
             down_since: BTreeMap::new(),
             passing: Passing::default(),
             held_up: HeldUp::default(),
+            identity: Identity::default(),
             silence: Silence::default(),
             heard_ms: BTreeMap::new(),
         }
@@ -162,6 +167,25 @@ impl Separation {
     pub fn promised(&self, now_ms: u64) -> Option<MotionPlan> {
         let flown = self.conflicts.as_ref()?.in_force();
         (!flown.has_left(now_ms)).then(|| flown.plan().clone())
+    }
+
+    /// What it promised and asks for, for a person; nothing before the first percept in the air.
+    pub fn agreed(&self) -> Option<Agreed> {
+        let conflicts = self.conflicts.as_ref()?;
+        let (_, now_ms) = self.clocks;
+        let flown = conflicts.in_force();
+        if flown.has_left(now_ms) {
+            return None;
+        }
+        let ends_ms = ends_ms(flown);
+        Some(Agreed {
+            way_ms: ends_ms.saturating_sub(now_ms),
+            circles_ms: now_ms.saturating_sub(ends_ms),
+            offers: conflicts.is_proposing(),
+            waits_for: conflicts.waits_for(now_ms).map(|id| shown(id.0)).collect(),
+            silent: conflicts.silent().map(|id| shown(id.0)).collect(),
+            held_up_ms: self.held_up.since_ms(now_ms),
+        })
     }
 
     /// A life of this peer begins.
@@ -215,15 +239,15 @@ impl Separation {
         let Some(conflicts) = self.conflicts.as_mut().filter(|_| traffic.is_sensed()) else {
             return;
         };
-        let near = traffic.seen().map(|s| (PeerId(s.id), s.at()));
-        conflicts.sensed(near, percept.time_ms);
-        let now_ms = percept.time_ms;
-        self.silence
-            .sense(traffic, conflicts, self.rules.tubes_m, now_ms);
+        let (now_ms, tubes_m) = (percept.time_ms, self.rules.tubes_m);
+        let seen = self.identity.of(traffic, conflicts, (tubes_m, now_ms));
+        let near = seen.iter().map(|s| (PeerId(s.id), s.at()));
+        conflicts.sensed(near, now_ms);
+        self.silence.sense(&seen, conflicts, tubes_m, now_ms);
         let flown = conflicts.in_force();
         let circles_since_ms = Some(ends_ms(flown)).filter(|ms| *ms <= now_ms);
         let across_m = 2.0 * CIRCLE_RADII * self.rules.turn_radius_m + self.rules.tubes_m;
-        for s in traffic.seen() {
+        for s in &seen {
             self.heard_ms.entry(s.id).or_insert(now_ms);
         }
         let heard_ms = |id: u16| self.heard_ms.get(&id).copied().unwrap_or(now_ms);

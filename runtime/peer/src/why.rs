@@ -11,6 +11,7 @@ use crate::layers::Layer;
 use crate::mission::mm;
 use crate::mission_state::MissionState;
 use crate::output::Status;
+use crate::separation::Separation;
 use crate::task_desk::TaskView;
 use crate::wire::message::{Bid, Epoch, ListedRun, Order, Orders};
 use core::fmt;
@@ -260,6 +261,49 @@ impl fmt::Display for LayerFlown {
     }
 }
 
+/// What a UAV promised others that it flies, and asks them for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Agreed {
+    /// For how long the way leads on that was agreed, milliseconds; 0 on the circle at its end.
+    pub way_ms: u64,
+    /// For how long it has flown that circle, milliseconds.
+    pub circles_ms: u64,
+    /// Whether it asks others for what is to follow.
+    pub offers: bool,
+    /// Whose word that waits for.
+    pub waits_for: Vec<u16>,
+    /// Who is near and answers nothing: they are kept clear of, and nobody waits for them.
+    pub silent: Vec<u16>,
+    /// For how long it has found no way that keeps clear of what others fly, milliseconds.
+    pub held_up_ms: Option<u64>,
+}
+
+impl fmt::Display for Agreed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ids = |ids: &[u16]| -> String {
+            let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
+            ids.join(" ")
+        };
+        if self.way_ms > 0 {
+            write!(f, "a way for {:.1} s more, then a circle", s(self.way_ms))?;
+        } else {
+            write!(f, "a circle, for {:.1} s", s(self.circles_ms))?;
+        }
+        match (self.offers, &self.waits_for[..]) {
+            (false, _) => {}
+            (true, []) => write!(f, "; asks for more, which all accepted")?,
+            (true, some) => write!(f, "; asks for more, waits for {}", ids(some))?,
+        }
+        if let Some(ms) = self.held_up_ms {
+            write!(f, "; no way was clear for {:.1} s", s(ms))?;
+        }
+        if !self.silent.is_empty() {
+            write!(f, "; silent: {}", ids(&self.silent))?;
+        }
+        Ok(())
+    }
+}
+
 /// The mission as one peer follows it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Work {
@@ -293,6 +337,9 @@ pub struct Work {
     /// Whether it makes way for an aircraft that is no member.
     #[serde(default, skip_serializing_if = "core::ops::Not::not")]
     pub evades: bool,
+    /// What it promised others, where UAVs keep apart by agreement.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub agreed: Option<Agreed>,
     /// Whether it takes part in planning.
     pub able: bool,
     /// Its open cells that come next, in order of flight.
@@ -432,6 +479,7 @@ pub(crate) fn work(state: &MissionState, now: Time) -> Work {
             .executive
             .as_ref()
             .is_some_and(|e| e.evades() || e.passes_over()),
+        agreed: state.separation.as_ref().and_then(Separation::agreed),
         able: state.able(),
         next_cells: open.iter().copied().take(NEXT_CELLS).collect(),
         open_cells: open.len(),
@@ -530,6 +578,9 @@ impl Why {
         }
         if let Some(layer) = &work.layer {
             writeln!(f, "  layer     {layer}")?;
+        }
+        if let Some(agreed) = &work.agreed {
+            writeln!(f, "  promised  {agreed}")?;
         }
         if work.evades {
             writeln!(
@@ -663,4 +714,50 @@ fn write_other(other: &Other, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, ", {} open cells", other.open_cells)?;
     }
     writeln!(f)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_promised_is_told_in_a_sentence() {
+        let on_its_way = Agreed {
+            way_ms: 4_200,
+            circles_ms: 0,
+            offers: false,
+            waits_for: Vec::new(),
+            silent: Vec::new(),
+            held_up_ms: None,
+        };
+        let told = on_its_way.to_string();
+        assert_eq!(told, "a way for 4.2 s more, then a circle");
+        let asks = Agreed {
+            offers: true,
+            ..on_its_way.clone()
+        };
+        assert!(
+            asks.to_string()
+                .ends_with("asks for more, which all accepted")
+        );
+        let waits = Agreed {
+            way_ms: 0,
+            circles_ms: 12_000,
+            waits_for: vec![2, 5],
+            ..asks
+        };
+        let told = waits.to_string();
+        assert_eq!(told, "a circle, for 12.0 s; asks for more, waits for 2 5");
+        let held_up = Agreed {
+            offers: false,
+            silent: vec![7],
+            held_up_ms: Some(3_000),
+            ..waits
+        };
+        let told = held_up.to_string();
+        assert!(
+            told.ends_with("; no way was clear for 3.0 s; silent: 7"),
+            "{told}"
+        );
+    }
 }

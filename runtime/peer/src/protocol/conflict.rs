@@ -126,8 +126,19 @@ pub struct Reach {
 pub struct Silent {
     /// All of them.
     pub all: BTreeSet<PeerId>,
-    /// Those of them who circle elsewhere than they promised, where they are.
-    pub elsewhere: BTreeMap<PeerId, Point>,
+    /// Those of them who circle elsewhere than they promised.
+    pub elsewhere: BTreeMap<PeerId, Stay>,
+}
+
+/// Where somebody stays who circles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stay {
+    /// Where it is.
+    pub at: Point,
+    /// The middle of all places at which it was meanwhile.
+    pub centre: Point,
+    /// How far they lie from there at most, metres.
+    pub radius_m: f64,
 }
 
 /// Whom a UAV lets pass.
@@ -308,6 +319,22 @@ impl Conflicts {
         self.promises.flown_by(id)
     }
 
+    /// Those of whom it is known.
+    pub fn speakers(&self) -> impl Iterator<Item = PeerId> {
+        self.promises.speakers()
+    }
+
+    /// Whether it is known of one.
+    #[must_use]
+    pub fn knows(&self, id: PeerId) -> bool {
+        self.promises.knows(id)
+    }
+
+    /// All that one may fly: what is in force as far as was heard, and what was accepted here.
+    pub fn may_fly(&self, id: PeerId) -> impl Iterator<Item = &Motion> {
+        self.promises.may_fly(id)
+    }
+
     /// The UAV is not where it was to be: from now on it flies this, whatever others say.
     pub fn impose(&mut self, motion: Motion) {
         self.promises.impose(motion);
@@ -405,11 +432,20 @@ impl Conflicts {
         self.held_up(now_ms, of).next().is_some()
     }
 
-    /// Whether a motion keeps off the circles of those who answer nothing.
+    /// Whether a motion keeps off the circles of those who answer nothing: of any that leads
+    /// through where one is, and for who circles too near to such a one already of that in which
+    /// it was seen.
     fn keeps_off_silent(&self, motion: &Motion, now_ms: u64) -> bool {
         let least_m = self.apart.detours.separation_m + self.apart.tubes_m;
-        let circle_m = 2.0 * self.apart.circle_radius_m;
-        let off = |at: &Point| motion.nearest_to_m(*at, now_ms) >= least_m + circle_m;
+        let any_m = least_m + 2.0 * self.apart.circle_radius_m;
+        let flown = self.in_force();
+        let off = |stay: &Stay| {
+            if flown.nearest_to_m(stay.at, now_ms) >= any_m {
+                motion.nearest_to_m(stay.at, now_ms) >= any_m
+            } else {
+                motion.nearest_to_m(stay.centre, now_ms) >= least_m + stay.radius_m
+            }
+        };
         self.silent.elsewhere.values().all(off)
     }
 
@@ -496,6 +532,20 @@ impl Conflicts {
             self.search_from_ms = now_ms + IMPROVE_MS;
         }
         settled
+    }
+
+    /// Who is near and answers nothing: nobody waits for their word.
+    pub fn silent(&self) -> impl Iterator<Item = PeerId> {
+        self.silent.all.iter().copied()
+    }
+
+    /// Whose word what is on offer waits for: who may be met and has not accepted it, or has not
+    /// said what it flies.
+    pub fn waits_for(&self, now_ms: u64) -> impl Iterator<Item = PeerId> {
+        let may_be_met = move |id: &PeerId| {
+            self.is_asked(*id, now_ms) && !self.silent.all.contains(id) && self.promises.lacks(*id)
+        };
+        self.seen.keys().copied().filter(may_be_met)
     }
 
     /// Whether another UAV may come near on what this one proposes, before either hears of
@@ -829,10 +879,46 @@ mod tests {
     }
 
     fn circle_at(there: [(PeerId, Point); 1]) -> Silent {
+        let stay = |at| Stay {
+            at,
+            centre: at,
+            radius_m: 0.0,
+        };
         Silent {
             all: there.iter().map(|(id, _)| *id).collect(),
-            elsewhere: there.into_iter().collect(),
+            elsewhere: there.map(|(id, at)| (id, stay(at))).into(),
         }
+    }
+
+    /// Any circle through where it is would reach to who circles near it: so it would never leave.
+    #[test]
+    fn who_circles_beside_one_who_is_silent_leaves_by_the_far_side() {
+        let (mut a, _) = head_on();
+        let flown = a.in_force().clone();
+        // A place so far from all that it flies.
+        let place = |away_m: f64| {
+            let east = (0..1_000).map(|m| Point::new(600.0 - f64::from(m), 0.0));
+            let mut near = east.skip_while(|p| flown.nearest_to_m(*p, 0) > away_m);
+            near.next().unwrap()
+        };
+        let least_m = a.apart.detours.separation_m + a.apart.tubes_m;
+        let any_m = least_m + 2.0 * a.apart.circle_radius_m;
+        let mut off = |away_m: f64| {
+            let at = place(away_m);
+            let seen = Stay {
+                at,
+                centre: Point::new(at.x + 20.0, at.y),
+                radius_m: 20.0,
+            };
+            a.are_silent(Silent {
+                all: [PeerId(2)].into(),
+                elsewhere: [(PeerId(2), seen)].into(),
+            });
+            a.keeps_off_silent(&flown, 0)
+        };
+        assert!(off(any_m + 50.0));
+        // Nearer than any circle may be, and clear of the one that was seen; and too near to it.
+        assert!(off(any_m - 10.0) && !off(least_m - 10.0));
     }
 
     #[test]

@@ -295,6 +295,17 @@ impl<M: Clone> Promises<M> {
         self.others.get(&id).map(|o| &o.in_force.motion)
     }
 
+    /// All that another UAV may fly: what is in force as far as was heard, and what was accepted
+    /// here.
+    pub fn may_fly(&self, id: PeerId) -> impl Iterator<Item = &M> {
+        self.others.get(&id).into_iter().flat_map(Other::standing)
+    }
+
+    /// Those of whom it is known.
+    pub fn speakers(&self) -> impl Iterator<Item = PeerId> {
+        self.others.keys().copied()
+    }
+
     /// Proposals of others that this UAV's motion in force alone keeps from being accepted.
     pub fn held_up<'a>(
         &'a self,
@@ -423,6 +434,15 @@ impl<M: Clone> Promises<M> {
             }
         }
         news
+    }
+
+    /// Whether another UAV has not accepted the own proposal; of nobody where there is none.
+    #[must_use]
+    pub fn lacks(&self, id: PeerId) -> bool {
+        self.proposal.as_ref().is_some_and(|own| {
+            let other = self.others.get(&id);
+            other.is_none_or(|o| o.accepts != own.version)
+        })
     }
 
     /// Whether everybody who is asked has accepted the own proposal.

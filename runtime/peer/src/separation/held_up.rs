@@ -26,6 +26,12 @@ impl HeldUp {
         long_ms >= HELD_UP_MS && !lately
     }
 
+    /// For how long it has found none, milliseconds.
+    pub fn since_ms(self, now_ms: u64) -> Option<u64> {
+        let since = self.held_up_since_ms?;
+        Some(now_ms.saturating_sub(since))
+    }
+
     /// It has looked for a way.
     pub fn looked(&mut self, now_ms: u64, is_clear: bool, offers: bool) {
         if is_clear {
@@ -55,8 +61,10 @@ mod tests {
             held_up.looked(now_ms, false, pleads);
         }
         assert_eq!(pleaded, [5_000, 15_000, 25_000]);
+        assert_eq!(held_up.since_ms(29_000), Some(29_000));
         held_up.looked(30_000, true, true);
         assert!(!held_up.is_due(31_000) && !held_up.is_due(60_000));
+        assert_eq!(held_up.since_ms(31_000), None);
         held_up.looked(60_000, false, false);
         assert!(!held_up.is_due(64_000) && held_up.is_due(65_000));
     }

@@ -18,8 +18,8 @@
 //! do, and the one with the higher number waits longer. Who flies already sees the other circle.
 
 use crate::PeerId;
-use crate::protocol::conflict::{Conflicts, Silent};
-use skein_behaviors::traffic::Traffic;
+use crate::protocol::conflict::{Conflicts, Silent, Stay};
+use skein_behaviors::traffic::Sighting;
 use skein_flight::separation::Motion;
 use skein_geometry::frame::Point;
 use std::collections::{BTreeMap, VecDeque};
@@ -56,8 +56,8 @@ pub(super) struct Silence {
 impl Silence {
     /// Takes note of where others are, at a time; how far one who follows what it promised may
     /// be beside it, metres.
-    pub fn sense(&mut self, traffic: &Traffic, known: &Conflicts, stray_m: f64, now_ms: u64) {
-        for s in traffic.seen() {
+    pub fn sense(&mut self, seen: &[Sighting], known: &Conflicts, stray_m: f64, now_ms: u64) {
+        for s in seen {
             let watched = self.watched.entry(s.id).or_default();
             let last_ms = watched.places.back().map_or(now_ms, |(ms, _)| *ms);
             if now_ms.saturating_sub(last_ms) > LOST_MS {
@@ -113,11 +113,11 @@ impl Silence {
                 if both_ms(since_ms) >= CIRCLES_MS + waits_ms {
                     silent.all.insert(peer);
                 }
-            } else if let Some((since_ms, at)) = watched.stays(across_m)
+            } else if let Some((since_ms, stay)) = watched.stays(across_m)
                 && both_ms(since_ms) >= STAYS_MS + waits_ms
             {
                 silent.all.insert(peer);
-                silent.elsewhere.insert(peer, at);
+                silent.elsewhere.insert(peer, stay);
             }
         }
         silent
@@ -137,19 +137,31 @@ pub(super) fn ends_ms(motion: &Motion) -> u64 {
 
 impl Watched {
     /// Since when it has been no farther from where it is than a circle is wide, and where.
-    fn stays(&self, across_m: f64) -> Option<(u64, Point)> {
-        let (_, at) = self.places.back()?;
+    fn stays(&self, across_m: f64) -> Option<(u64, Stay)> {
+        let (_, at) = *self.places.back()?;
         let near = self.places.iter().rev();
-        let near = near.take_while(|(_, p)| (p - at).norm() <= across_m);
-        Some((near.last()?.0, *at))
+        let near = near.take_while(|(_, p)| (*p - at).norm() <= across_m);
+        let (mut since_ms, mut low, mut high) = (0, at, at);
+        for (ms, p) in near.clone() {
+            since_ms = *ms;
+            low = Point::new(low.x.min(p.x), low.y.min(p.y));
+            high = Point::new(high.x.max(p.x), high.y.max(p.y));
+        }
+        let centre = low + 0.5 * (high - low);
+        let radius_m = near.map(|(_, p)| (*p - centre).norm()).fold(0.0, f64::max);
+        let stay = Stay {
+            at,
+            centre,
+            radius_m,
+        };
+        Some((since_ms, stay))
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::protocol::conflict::{Apart, Intent, PromisedPlan};
-    use skein_behaviors::traffic::Sighting;
     use skein_flight::separation::{Detours, End, MotionPlan, Stretch};
     use skein_geometry::frame::Pose;
 
@@ -157,7 +169,7 @@ mod tests {
     const STRAY_M: f64 = 6.0;
 
     /// A straight way of some metres and a circle, from a place on.
-    fn motion(north_m: f64, length_m: u32) -> Motion {
+    pub fn motion(north_m: f64, length_m: u32) -> Motion {
         let airspeed_mmps = 12_000;
         let way = Stretch {
             radius_mm: 0,
@@ -178,7 +190,7 @@ mod tests {
         .unwrap()
     }
 
-    fn knows(id: u16, said: &Motion) -> Conflicts {
+    pub fn knows(id: u16, said: &Motion) -> Conflicts {
         let airframe = crate::testing::airframe();
         let apart = Apart {
             detours: Detours {
@@ -224,8 +236,7 @@ mod tests {
                 north_dm: dm(at.y),
                 height_dm: 450,
             };
-            let traffic = Traffic::new(900.0, [seen]);
-            silence.sense(&traffic, &known, STRAY_M, now_ms);
+            silence.sense(&[seen], &known, STRAY_M, now_ms);
             let mine_ms = mine_ms.filter(|ms| *ms <= now_ms);
             let silent = silence.silent((5, &known), |_| true, (mine_ms, ACROSS_M), now_ms);
             if silent.all.contains(&PeerId(id)) {
@@ -262,5 +273,26 @@ mod tests {
         assert!((15_000..17_000).contains(&at_ms) && !as_promised, "{at_ms}");
         let (later_ms, _) = counts_from(2, &said, &flown, Some(0)).unwrap();
         assert_eq!(later_ms, at_ms + AFTER_MS);
+    }
+
+    #[test]
+    fn in_which_circle_it_was_seen_is_told_by_where_it_was() {
+        let mut watched = Watched::default();
+        let at = |deg: f64| {
+            let (sin, cos) = deg.to_radians().sin_cos();
+            Point::new(300.0 + 25.0 * cos, 25.0 * sin)
+        };
+        // It came from the west, and that is long ago.
+        watched.places.push_back((0, Point::new(0.0, 0.0)));
+        for (ms, deg) in (1_000..20_000).step_by(200).zip((0..).step_by(5)) {
+            watched.places.push_back((ms, at(f64::from(deg))));
+        }
+        let (since_ms, stay) = watched.stays(ACROSS_M).unwrap();
+        assert_eq!(since_ms, 1_000);
+        assert!(
+            (stay.centre - Point::new(300.0, 0.0)).norm() < 0.1,
+            "{stay:?}"
+        );
+        assert!((stay.radius_m - 25.0).abs() < 0.1, "{stay:?}");
     }
 }

@@ -1,0 +1,165 @@
+//! Who is who of those that are sensed (D2.7 §1.3): by what they fly, before by the number that
+//! their airframes show.
+//!
+//! A configuration that was copied to another UAV has that one speak under a number that its
+//! airframe does not show, and the one that shows it says nothing. By the number alone whoever
+//! senses the first waits for the word of somebody who never says any, and takes the word of the
+//! first for that of the second, which circles somewhere else.
+//!
+//! | what is sensed | whom it counts as |
+//! |---|---|
+//! | one that flies what its number promised, or what nobody did | its number |
+//! | one that flies what another number promised, which is sensed nowhere that it promised to be | that other number, until one of the two is seen to be who it shows |
+//! | one that flies for a while what its number did not promise, though that promised something | one who said nothing, until it flies what its number promised |
+
+use crate::PeerId;
+use crate::protocol::conflict::Conflicts;
+use skein_behaviors::traffic::{Sighting, Traffic};
+use std::collections::BTreeMap;
+
+/// Who flies for so long what its number did not promise, as far as is known, is somebody else,
+/// milliseconds: all say every five seconds what they fly.
+const ELSEWHERE_MS: u64 = 6_000;
+
+/// The number of one that shows a number and does not speak under it.
+const STRANGER: u16 = 0x8000;
+
+/// Most numbers of whom it is known that another one shows them: as many as are sensed at once,
+/// and more.
+const KNOWN_MAX: usize = 32;
+
+/// The number that an airframe shows.
+pub(super) fn shown(number: u16) -> u16 {
+    number & !STRANGER
+}
+
+/// What is known of who shows whose number.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Identity {
+    /// By the number shown the one under which that UAV speaks.
+    speaks_as: BTreeMap<u16, u16>,
+    /// Since when a UAV does not fly what its number promised, milliseconds.
+    elsewhere_since_ms: BTreeMap<u16, u64>,
+}
+
+impl Identity {
+    /// Those who are sensed at a time, each under the number under which it speaks. One who flies
+    /// what it promised is no farther from that than `stray_m`, metres.
+    pub fn of(
+        &mut self,
+        traffic: &Traffic,
+        known: &Conflicts,
+        (stray_m, now_ms): (f64, u64),
+    ) -> Vec<Sighting> {
+        let flies = |id: u16, s: &Sighting| {
+            let off_m = |pose: skein_geometry::frame::Pose| (pose.position() - s.at()).norm();
+            known
+                .may_fly(PeerId(id))
+                .any(|m| off_m(m.pose_at(now_ms)) <= stray_m)
+        };
+        let mut seen: Vec<Sighting> = traffic.seen().copied().collect();
+        self.elsewhere_since_ms
+            .retain(|id, _| seen.iter().any(|s| s.id == *id));
+        for s in &seen {
+            if flies(s.id, s) {
+                self.elsewhere_since_ms.remove(&s.id);
+                self.speaks_as
+                    .retain(|shows, speaks| *shows != s.id && *speaks != s.id);
+            } else if known.knows(PeerId(s.id)) {
+                self.elsewhere_since_ms.entry(s.id).or_insert(now_ms);
+            }
+        }
+        for s in &seen {
+            let is_found = |id: u16| seen.iter().any(|o| o.id == id && flies(id, o));
+            let is_other = |id: &PeerId| id.0 != s.id && flies(id.0, s) && !is_found(id.0);
+            if !flies(s.id, s)
+                && self.speaks_as.len() < KNOWN_MAX
+                && let Some(id) = known.speakers().find(is_other)
+            {
+                self.speaks_as.insert(s.id, id.0);
+            }
+        }
+        for s in &mut seen {
+            s.id = self.speaks_as.get(&s.id).copied().unwrap_or_else(|| {
+                let elsewhere = self.elsewhere_since_ms.get(&s.id);
+                let for_long = elsewhere.is_some_and(|t| now_ms.saturating_sub(*t) >= ELSEWHERE_MS);
+                let is_other = for_long || self.speaks_as.values().any(|id| *id == s.id);
+                if is_other { s.id | STRANGER } else { s.id }
+            });
+        }
+        seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::separation::silence::tests::{knows, motion};
+
+    const STRAY_M: f64 = 6.0;
+
+    fn sighting(id: u16, east_m: f64, north_m: f64) -> Sighting {
+        #[allow(clippy::cast_possible_truncation, reason = "some metres")]
+        let dm = |m: f64| (m * 10.0) as i32;
+        Sighting {
+            id,
+            east_dm: dm(east_m),
+            north_dm: dm(north_m),
+            height_dm: 0,
+        }
+    }
+
+    /// Who is found to be whom at a time, of those that show these numbers there, where 3 promised
+    /// to fly the first 600 m to the east, 12 m a second.
+    fn found(identity: &mut Identity, at_ms: u64, seen: &[(u16, f64, f64)]) -> Vec<u16> {
+        let known = knows(3, &motion(0.0, 600));
+        let seen = seen.iter().map(|(id, e, n)| sighting(*id, *e, *n));
+        let traffic = Traffic::new(3_000.0, seen);
+        let found = identity.of(&traffic, &known, (STRAY_M, at_ms));
+        found.iter().map(|s| s.id).collect()
+    }
+
+    #[test]
+    fn who_speaks_under_a_number_is_known_by_where_it_is() {
+        let once = |seen: &[_]| found(&mut Identity::default(), 10_000, seen);
+        assert_eq!(once(&[(3, 120.0, 0.0), (6, 400.0, 90.0)]), [3, 6]);
+        // It shows another number than it speaks under.
+        assert_eq!(once(&[(6, 121.0, 2.0), (7, 400.0, 90.0)]), [3, 7]);
+        // And the one that shows its number is silent somewhere else.
+        let stranger = 3 | STRANGER;
+        assert_eq!(once(&[(3, 400.0, 90.0), (6, 120.0, 0.0)]), [stranger, 3]);
+        assert_eq!(once(&[(6, 120.0, 0.0), (3, 400.0, 90.0)]), [3, stranger]);
+        assert_eq!(shown(stranger), 3);
+        // Nobody is where it promised to be.
+        assert_eq!(once(&[(3, 400.0, 90.0), (6, 300.0, 0.0)]), [3, 6]);
+    }
+
+    #[test]
+    fn what_was_found_stays_until_one_is_seen_to_be_who_it_shows() {
+        let mut identity = Identity::default();
+        let both = [(6, 120.0, 0.0), (3, 400.0, 90.0)];
+        let stranger = 3 | STRANGER;
+        assert_eq!(found(&mut identity, 10_000, &both), [3, stranger]);
+        // What it flies now was not heard.
+        let later = [(6, 150.0, 40.0), (3, 400.0, 90.0)];
+        assert_eq!(found(&mut identity, 15_000, &later), [3, stranger]);
+        assert_eq!(found(&mut identity, 16_000, &later[1..]), [stranger]);
+        // Now the one that shows the number is where that promised to be.
+        let itself = [(6, 150.0, 40.0), (3, 240.0, 0.0)];
+        assert_eq!(found(&mut identity, 20_000, &itself), [6, 3]);
+    }
+
+    #[test]
+    fn who_is_elsewhere_than_its_number_promised_for_long_says_nothing() {
+        let mut identity = Identity::default();
+        let elsewhere = [(3, 400.0, 90.0), (8, 10.0, 10.0)];
+        assert_eq!(found(&mut identity, 10_000, &elsewhere), [3, 8]);
+        assert_eq!(found(&mut identity, 15_900, &elsewhere), [3, 8]);
+        let stranger = 3 | STRANGER;
+        assert_eq!(found(&mut identity, 16_000, &elsewhere), [stranger, 8]);
+        assert_eq!(found(&mut identity, 20_000, &[(3, 240.0, 0.0)]), [3]);
+        // Of who was out of sight nothing is known.
+        assert_eq!(found(&mut identity, 30_000, &[]), [0; 0]);
+        assert_eq!(found(&mut identity, 40_000, &elsewhere), [3, 8]);
+    }
+}
