@@ -123,6 +123,7 @@ impl Board {
                 self.n_covered += usize::from(is_coverable(&cell));
             }
         }
+        self.note_done();
         let (Some((mine, seen)), Some((theirs, saw))) = (&mut self.claims, &other.claims) else {
             return;
         };
@@ -130,6 +131,14 @@ impl Board {
         let known: BTreeSet<Vec<PointMm>> = places.filter(|(_, s)| **s).map(|(p, _)| p).collect();
         for (ring, seen) in mine.rings().iter().zip(seen) {
             *seen = *seen || known.contains(&ring_mm(ring));
+        }
+    }
+
+    /// What was seen of another mission may be all that is to be seen of this one in this lap.
+    fn note_done(&mut self) {
+        let last_ms = self.seen.iter().flatten().map(|s| s.at_ms).max();
+        if let Some(at_ms) = last_ms.filter(|_| self.n_covered == self.n_coverable) {
+            self.layers.done(self.lap, at_ms);
         }
     }
 

@@ -119,6 +119,7 @@ mod tests {
     use crate::world::camera::{Camera, Eye};
     use crate::world::fixture::{airframe, polygon, square};
     use crate::world::motion::Piece;
+    use crate::world::no_fly::TurnAway;
     use crate::world::{Fact, Judge, Survey};
     use skein_flight::coverage::ring::CellId;
     use skein_flight::trajectory::wind::Wind;
@@ -132,11 +133,16 @@ mod tests {
 
     /// The same with these zones.
     fn judge_with(zones: &[&[(i32, i32)]]) -> Judge {
+        Judge::new(survey(480_000, zones)).with_laps(2)
+    }
+
+    /// What is to be seen of an area that reaches so far to the east, millimetres.
+    fn survey(east_mm: i32, zones: &[&[(i32, i32)]]) -> Arc<Survey> {
         let mut spec = square(1);
         spec.zones = zones.iter().map(|z| polygon(z)).collect();
         let mut mission = (*spec.mission).clone();
         mission.zones = zones.iter().map(|z| z.to_vec()).collect();
-        mission.area = vec![(0, 0), (480_000, 0), (480_000, 48_000), (0, 48_000)];
+        mission.area = vec![(0, 0), (east_mm, 0), (east_mm, 48_000), (0, 48_000)];
         mission.layers = Some(Arc::new(Layers {
             heights_mm: vec![45_000, 100_000],
             slot_mm: 5_000,
@@ -145,7 +151,21 @@ mod tests {
         }));
         mission.further_laps = 1;
         spec.mission = Arc::new(mission);
-        Judge::new(Arc::new(Survey::new(&spec))).with_laps(2)
+        Arc::new(Survey::new(&spec))
+    }
+
+    /// The operator leaves of an area what was seen already: that layer is done.
+    #[test]
+    fn of_a_smaller_area_that_was_seen_the_layer_is_done() {
+        let mut judge = judge();
+        assert!((5..10).contains(&along_for(&mut judge, 45.0, 1_000, 24_000)));
+        let turn = TurnAway::of(&square(1).mission);
+        judge.revise(survey(240_000, &[]), (None, 0, 1, false), 2, turn);
+        let seen = judge.layers();
+        assert!(seen[0].seen_ms.is_some_and(|t| t < 26_000), "{seen:?}");
+        assert_eq!((seen[1].seen_ms, seen[1].lacking), (None, 5));
+        assert_eq!(along(&mut judge, 100.0, 100_000), 5);
+        assert!(judge.complete() && judge.layers()[1].seen_ms.is_some());
     }
 
     /// Flies along the only lane at a height.
