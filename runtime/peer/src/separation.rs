@@ -33,7 +33,7 @@ use crate::wire::codec::Body;
 use crate::wire::message::{Member, Record};
 use crate::{Incarnation, PeerId};
 use held_up::HeldUp;
-use identity::{Identity, shown};
+use identity::Identity;
 use passing::{Gist, Passing};
 use silence::{Silence, ends_ms};
 use skein_behaviors::executive::promised::{CIRCLE_RADII, Extension, PROMISED_MOST_S};
@@ -178,12 +178,13 @@ impl Separation {
             return None;
         }
         let ends_ms = ends_ms(flown);
+        let shown = |id: PeerId| self.identity.shown(id.0);
         Some(Agreed {
             way_ms: ends_ms.saturating_sub(now_ms),
             circles_ms: now_ms.saturating_sub(ends_ms),
             offers: conflicts.is_proposing(),
-            waits_for: conflicts.waits_for(now_ms).map(|id| shown(id.0)).collect(),
-            silent: conflicts.silent().map(|id| shown(id.0)).collect(),
+            waits_for: conflicts.waits_for(now_ms).map(shown).collect(),
+            silent: conflicts.silent().map(shown).collect(),
             held_up_ms: self.held_up.since_ms(now_ms),
         })
     }

@@ -21,17 +21,9 @@ use std::collections::BTreeMap;
 /// milliseconds: all say every five seconds what they fly.
 const ELSEWHERE_MS: u64 = 6_000;
 
-/// The number of one that shows a number and does not speak under it.
-const STRANGER: u16 = 0x8000;
-
 /// Most numbers of whom it is known that another one shows them: as many as are sensed at once,
 /// and more.
 const KNOWN_MAX: usize = 32;
-
-/// The number that an airframe shows.
-pub(super) fn shown(number: u16) -> u16 {
-    number & !STRANGER
-}
 
 /// What is known of who shows whose number.
 #[derive(Clone, Debug, Default)]
@@ -40,6 +32,8 @@ pub(super) struct Identity {
     speaks_as: BTreeMap<u16, u16>,
     /// Since when a UAV does not fly what its number promised, milliseconds.
     elsewhere_since_ms: BTreeMap<u16, u64>,
+    /// By the number shown one that nobody has, of who does not speak under the number shown.
+    strangers: BTreeMap<u16, u16>,
 }
 
 impl Identity {
@@ -58,8 +52,9 @@ impl Identity {
                 .any(|m| off_m(m.pose_at(now_ms)) <= stray_m)
         };
         let mut seen: Vec<Sighting> = traffic.seen().copied().collect();
-        self.elsewhere_since_ms
-            .retain(|id, _| seen.iter().any(|s| s.id == *id));
+        let is_seen = |id: u16| seen.iter().any(|s| s.id == id);
+        self.elsewhere_since_ms.retain(|id, _| is_seen(*id));
+        self.strangers.retain(|id, _| is_seen(*id));
         for s in &seen {
             if flies(s.id, s) {
                 self.elsewhere_since_ms.remove(&s.id);
@@ -79,15 +74,50 @@ impl Identity {
                 self.speaks_as.insert(s.id, id.0);
             }
         }
-        for s in &mut seen {
-            s.id = self.speaks_as.get(&s.id).copied().unwrap_or_else(|| {
-                let elsewhere = self.elsewhere_since_ms.get(&s.id);
-                let for_long = elsewhere.is_some_and(|t| now_ms.saturating_sub(*t) >= ELSEWHERE_MS);
-                let is_other = for_long || self.speaks_as.values().any(|id| *id == s.id);
-                if is_other { s.id | STRANGER } else { s.id }
-            });
+        let numbers: Vec<u16> = seen
+            .iter()
+            .map(|s| self.number(s.id, &seen, known, now_ms))
+            .collect();
+        for (s, number) in seen.iter_mut().zip(numbers) {
+            s.id = number;
         }
         seen
+    }
+
+    /// Under which number one counts that shows this one.
+    fn number(&mut self, shows: u16, seen: &[Sighting], known: &Conflicts, now_ms: u64) -> u16 {
+        if let Some(speaks) = self.speaks_as.get(&shows) {
+            return *speaks;
+        }
+        let elsewhere = self.elsewhere_since_ms.get(&shows);
+        let for_long = elsewhere.is_some_and(|t| now_ms.saturating_sub(*t) >= ELSEWHERE_MS);
+        if !for_long && self.speaks_as.values().all(|id| *id != shows) {
+            self.strangers.remove(&shows);
+            return shows;
+        }
+        let has_it =
+            |number: u16| known.knows(PeerId(number)) || seen.iter().any(|s| s.id == number);
+        let before = self.strangers.get(&shows).copied().filter(|n| !has_it(*n));
+        let others = || {
+            self.strangers
+                .iter()
+                .filter(|(id, _)| **id != shows)
+                .map(|(_, n)| *n)
+        };
+        let free = || {
+            (0..=u16::MAX)
+                .rev()
+                .find(|n| !has_it(*n) && others().all(|o| o != *n))
+        };
+        let number = before.or_else(free).unwrap_or(shows);
+        self.strangers.insert(shows, number);
+        number
+    }
+
+    /// The number that is shown by one that counts under this one, for a person.
+    pub fn shown(&self, number: u16) -> u16 {
+        let stranger = self.strangers.iter().find(|(_, n)| **n == number);
+        stranger.map_or(number, |(shows, _)| *shows)
     }
 }
 
@@ -126,10 +156,9 @@ mod tests {
         // It shows another number than it speaks under.
         assert_eq!(once(&[(6, 121.0, 2.0), (7, 400.0, 90.0)]), [3, 7]);
         // And the one that shows its number is silent somewhere else.
-        let stranger = 3 | STRANGER;
+        let stranger = u16::MAX;
         assert_eq!(once(&[(3, 400.0, 90.0), (6, 120.0, 0.0)]), [stranger, 3]);
         assert_eq!(once(&[(6, 120.0, 0.0), (3, 400.0, 90.0)]), [3, stranger]);
-        assert_eq!(shown(stranger), 3);
         // Nobody is where it promised to be.
         assert_eq!(once(&[(3, 400.0, 90.0), (6, 300.0, 0.0)]), [3, 6]);
     }
@@ -138,12 +167,16 @@ mod tests {
     fn what_was_found_stays_until_one_is_seen_to_be_who_it_shows() {
         let mut identity = Identity::default();
         let both = [(6, 120.0, 0.0), (3, 400.0, 90.0)];
-        let stranger = 3 | STRANGER;
+        let stranger = u16::MAX;
         assert_eq!(found(&mut identity, 10_000, &both), [3, stranger]);
-        // What it flies now was not heard.
+        assert_eq!((identity.shown(stranger), identity.shown(3)), (3, 3));
+        let taken = [(6, 120.0, 0.0), (3, 400.0, 90.0), (u16::MAX, 900.0, 0.0)];
+        let other = u16::MAX - 1;
+        assert_eq!(found(&mut identity, 11_000, &taken), [3, other, u16::MAX]);
+        // What it flies now was not heard. The number given stays.
         let later = [(6, 150.0, 40.0), (3, 400.0, 90.0)];
-        assert_eq!(found(&mut identity, 15_000, &later), [3, stranger]);
-        assert_eq!(found(&mut identity, 16_000, &later[1..]), [stranger]);
+        assert_eq!(found(&mut identity, 15_000, &later), [3, other]);
+        assert_eq!(found(&mut identity, 16_000, &later[1..]), [other]);
         // Now the one that shows the number is where that promised to be.
         let itself = [(6, 150.0, 40.0), (3, 240.0, 0.0)];
         assert_eq!(found(&mut identity, 20_000, &itself), [6, 3]);
@@ -155,8 +188,7 @@ mod tests {
         let elsewhere = [(3, 400.0, 90.0), (8, 10.0, 10.0)];
         assert_eq!(found(&mut identity, 10_000, &elsewhere), [3, 8]);
         assert_eq!(found(&mut identity, 15_900, &elsewhere), [3, 8]);
-        let stranger = 3 | STRANGER;
-        assert_eq!(found(&mut identity, 16_000, &elsewhere), [stranger, 8]);
+        assert_eq!(found(&mut identity, 16_000, &elsewhere), [u16::MAX, 8]);
         assert_eq!(found(&mut identity, 20_000, &[(3, 240.0, 0.0)]), [3]);
         // Of who was out of sight nothing is known.
         assert_eq!(found(&mut identity, 30_000, &[]), [0; 0]);
