@@ -369,10 +369,7 @@ impl Membership {
                     id: *id,
                     incarnation: *incarnation,
                     count: 0,
-                    age: Age {
-                        told_ms: 0,
-                        at: *since,
-                    },
+                    age: Age::beyond_all(*since),
                     hops: *hops,
                     interval: self.interval,
                     suspected: None,

@@ -22,6 +22,13 @@ impl Age {
         self.told_ms.saturating_add(now.since_ms(self.at))
     }
 
+    /// Older than anybody waits for, of who was never heard: how old what it said was when it came
+    /// nobody knows, and who waits for longer than whoever tells of it would take it for alive.
+    pub(super) fn beyond_all(at: Time) -> Self {
+        let told_ms = u64::from(u16::MAX) * 100;
+        Self { told_ms, at }
+    }
+
     /// As much older.
     pub(super) fn and_ms(self, more_ms: u64) -> Self {
         let told_ms = self.told_ms.saturating_add(more_ms);

@@ -63,9 +63,15 @@ fn of_whom_a_record_alone_was_heard_others_are_told_as_of_the_dead() {
     // Neighbours take it for dead, and the one itself is heard all the same.
     let mut other = Membership::new(4, 1000);
     let told = m.gossip(Time(bound_ms + 250), 4);
-    other.on_beacon(Time(bound_ms + 250), 1, 1, &beacon(1, told));
+    other.on_beacon(Time(bound_ms + 250), 1, 1, &beacon(1, told.clone()));
     assert_eq!(other.all().filter(|(id, ..)| *id == 2).count(), 1);
     assert!(other.live().all(|(id, _)| id != 2));
+    // So does who waits for longer than the one that tells of it.
+    let mut patient = Membership::new(5, 16_000);
+    assert!(patient.patience(Time(0)).bound_ms > 2 * bound_ms);
+    patient.on_beacon(Time(bound_ms + 250), 1, 1, &beacon(1, told));
+    assert_eq!(patient.all().filter(|(id, ..)| *id == 2).count(), 1);
+    assert!(patient.live().all(|(id, _)| id != 2));
     m.on_heartbeat(Time(bound_ms + 500), 2, 5, (1, 4));
     assert!(m.live().any(|(id, _)| id == 2));
 }
