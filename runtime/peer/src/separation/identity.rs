@@ -55,8 +55,9 @@ impl Identity {
         let is_seen = |id: u16| seen.iter().any(|s| s.id == id);
         self.elsewhere_since_ms.retain(|id, _| is_seen(*id));
         self.strangers.retain(|id, _| is_seen(*id));
-        for s in &seen {
-            if flies(s.id, s) {
+        let is_itself: Vec<bool> = seen.iter().map(|s| flies(s.id, s)).collect();
+        for (s, is_itself) in seen.iter().zip(&is_itself) {
+            if *is_itself {
                 self.elsewhere_since_ms.remove(&s.id);
                 self.speaks_as
                     .retain(|shows, speaks| *shows != s.id && *speaks != s.id);
@@ -64,11 +65,10 @@ impl Identity {
                 self.elsewhere_since_ms.entry(s.id).or_insert(now_ms);
             }
         }
-        for s in &seen {
-            let is_found = |id: u16| seen.iter().any(|o| o.id == id && flies(id, o));
+        let is_found = |id: u16| seen.iter().zip(&is_itself).any(|(s, is)| *is && s.id == id);
+        for (s, _) in seen.iter().zip(&is_itself).filter(|(_, is)| !**is) {
             let is_other = |id: &PeerId| id.0 != s.id && flies(id.0, s) && !is_found(id.0);
-            if !flies(s.id, s)
-                && self.speaks_as.len() < KNOWN_MAX
+            if self.speaks_as.len() < KNOWN_MAX
                 && let Some(id) = known.speakers().find(is_other)
             {
                 self.speaks_as.insert(s.id, id.0);
