@@ -8,8 +8,8 @@ use std::collections::{BTreeMap, VecDeque};
 /// Over so long a time a share is kept.
 const WINDOW_MS: u64 = 10_000;
 
-/// The bucket that was full when the window began was filled among those of so long before:
-/// whoever comes into earshot is heard within the longest interval.
+/// Whoever comes into earshot is heard within the longest interval: until then a peer spends as
+/// one of those who were there before.
 const BEFORE_MS: u64 = 16_000;
 
 /// What the peers of one run transmitted.
@@ -64,11 +64,11 @@ impl AirtimeCheck {
     }
 
     /// Judges what everybody sent within the window, by the fewest radios in its earshot
-    /// (itself included) meanwhile, of which it may miss one. To the share of that time
-    /// comes what a full bucket held when it began, by the fewest of the time before, and
-    /// one record: the largest goes when
-    /// the bucket is full, and what it lacked is owed. Whoever follows a newer mission than
-    /// somebody in its component may have borrowed its part of what all may use, and a period of it.
+    /// (itself included) meanwhile and for so long before that all are heard of, of which it
+    /// may miss one. To the share of that time comes what a full bucket held when it began, and
+    /// one record: the largest goes when the bucket is full, and what it lacked is owed. Whoever
+    /// follows a newer mission than somebody in its component may have borrowed its part of what
+    /// all may use, and a period of it.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let now_ms = snapshot.now_ms;
         let old = |t: &(u64, u64)| t.0 + WINDOW_MS < now_ms;
@@ -81,9 +81,7 @@ impl AirtimeCheck {
             while sharers.front().is_some_and(older) {
                 sharers.pop_front();
             }
-            let before = sharers.iter().map(|s| s.1).min().unwrap_or(1);
-            let lately = sharers.iter().filter(|s| !old(s));
-            let fewest = lately.map(|s| s.1).min().unwrap_or(1);
+            let fewest = sharers.iter().map(|s| s.1).min().unwrap_or(1);
             let sent = self.sent.entry(*id).or_default();
             while sent.front().is_some_and(old) {
                 sent.pop_front();
@@ -92,7 +90,7 @@ impl AirtimeCheck {
             let largest = sent.iter().map(|s| s.1).max().unwrap_or(0);
             let share_ps =
                 |radios: u64| self.rate_bps / 8 * SHARE_PERCENT / 100 / (radios - 1).max(1);
-            let burst = share_ps(before) * self.burst_ms / 1000;
+            let burst = share_ps(fewest) * self.burst_ms / 1000;
             // A clock that jumps within the window fills the bucket once more.
             let from_ms = now_ms.saturating_sub(WINDOW_MS);
             let shown_ms = snapshot.handicaps.shown_ms(*id, from_ms, now_ms);
@@ -192,6 +190,24 @@ mod tests {
                 story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
             }
             assert_eq!(found.counts.contains_key("S9"), broken, "{jump_ms}");
+        }
+    }
+
+    #[test]
+    fn who_comes_into_earshot_counts_once_it_can_have_been_heard() {
+        // A share among twelve is 327 bytes a second, one among six is 720.
+        for (lasts_s, broken) in [(20, false), (40, true)] {
+            let mut check = AirtimeCheck::new(64_000, 1000);
+            let (mut story, mut found) = (Story::new(0), Findings::new(1));
+            let views: Vec<_> = (1..=12).map(|id| (id, speaking())).collect();
+            for t in 0..20 + lasts_s {
+                let there = if t < 20 { 6 } else { 12 };
+                check.on_transmission(t * 1000, 1, 680 - OVERHEAD_BYTES);
+                story.snapshot(t * 1000, &views[..there], |s| {
+                    check.on_snapshot(s, &mut found)
+                });
+            }
+            assert_eq!(found.counts.contains_key("S9"), broken, "{lasts_s}");
         }
     }
 
