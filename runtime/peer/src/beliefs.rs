@@ -77,8 +77,8 @@ pub struct Beliefs {
     pub cannot_fly_all: bool,
     /// Whether a peer that it believed to be down since it came to its state is there again.
     pub missed: bool,
-    /// Whether it knew many and hears nobody.
-    pub hears_nobody: bool,
+    /// Whether it knew many and hears nobody, or for long nobody who has cells to fly.
+    pub astray: bool,
     /// Whom it says that it follows, once it had seen it.
     pub follows: Option<Follows>,
     /// Tasks that it knows to be open, and in its eyes somebody can do.

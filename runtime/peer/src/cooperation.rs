@@ -12,7 +12,7 @@
 //! | it was given a task, and its flight is planned | fly that, then the cells of the plan |
 //! | the plan has cells | fly them |
 //! | nothing to fly, others at work | loiter where it is |
-//! | and among many nobody is heard | loiter at base |
+//! | and among many nobody is heard, or for 20 T' nobody who has cells to fly | loiter at base |
 //!
 //! | event | what follows |
 //! |---|---|
@@ -48,7 +48,7 @@ use crate::mission_state::MissionState;
 use crate::offload::{Job, MissionGeometry};
 use crate::output::{Report, Status};
 use crate::protocol::membership::Membership;
-use crate::protocol::negotiation::{Adoption, are_many};
+use crate::protocol::negotiation::Adoption;
 use crate::protocol::runs::PlannedCell;
 use crate::sensed_aircraft::ToldAircraft;
 use crate::tasking::Tasking;
@@ -452,7 +452,7 @@ impl Cooperation {
         effects.extend(state.negotiate(s, able, timers));
         effects.extend(self.tasking.tick(s, order, state));
         effects.extend(state.notice_end(s, timers));
-        state.astray = s.membership.hears_nobody(s.now) && are_many(s.membership.uavs());
+        state.look_for_company(s);
         state.silent = s.is_silent;
         state.listen(s, order);
         state.steer_by_state(s.now, order);
@@ -604,7 +604,7 @@ impl Cooperation {
         beliefs.relays = state.relay.is_some();
         beliefs.evades = state.executive.as_ref().is_some_and(|e| e.evades());
         beliefs.traces = state.executive.as_ref().is_some_and(|e| e.is_tracing());
-        beliefs.hears_nobody = state.astray;
+        beliefs.astray = state.astray;
         beliefs.cannot_fly_all = state.cannot_fly_all();
         beliefs.missed = state.stage.missed(state.lost);
         beliefs.stage = Some((state.stage.at(), state.stage.by()));

@@ -30,7 +30,7 @@ use crate::offload::{Job, MissionGeometry};
 use crate::output::Report;
 use crate::protocol::auction::flown::AskedWays;
 use crate::protocol::division;
-use crate::protocol::negotiation::{Action, Context, Negotiation};
+use crate::protocol::negotiation::{Action, Context, Negotiation, are_many};
 use crate::protocol::runs::PlannedCell;
 use crate::protocol::sections::FIRST_LIFE;
 use crate::separation::Separation;
@@ -58,6 +58,10 @@ pub const CELLS_PER_COVERED_RECORD: u16 = 5;
 /// one to speak, two to be passed on. Who misses them flies those cells again, and hears
 /// of the next lap from the ground station.
 const LAP_PERIODS: u64 = 3;
+
+/// Among many, who has nothing to fly waits near the others for so many intervals T' while nobody
+/// that it hears has cells to fly: as long as after a division nobody asks for another one.
+const IDLE_INTERVALS: u64 = 20;
 
 /// For so many periods after a beacon its author is taken to fly on round the loop.
 const FELLOW_PERIODS: u64 = 60;
@@ -134,7 +138,9 @@ pub(crate) struct MissionState {
     /// Whether all others were believed down at the last tick.
     alone: bool,
     pub finished: bool,
-    /// Whether it heard of many and hears nobody now.
+    /// Since when it has nothing to fly and nobody that it hears has cells to fly.
+    idle_since: Option<Time>,
+    /// Whether it heard of many, and to wait where it is leads to nothing.
     pub astray: bool,
     /// Where it waits with nothing to do.
     pub listening: Listening,
@@ -637,6 +643,25 @@ impl MissionState {
         is_free && self.separation.is_none() && self.stage.state().goal == StateGoal::Home
     }
 
+    /// Looks whether to wait where it is leads to anything: among many that hear no more than a
+    /// part of each other the rest may be done, and whoever is done is at the base.
+    pub fn look_for_company(&mut self, s: &Situation<'_>) {
+        let is_many = are_many(s.membership.uavs());
+        let sections = &self.negotiation.sections;
+        let waits = is_many && sections.plan().is_empty();
+        let live = &self.company.present().live;
+        self.idle_since = if waits && live.keys().all(|id| sections.n_left(*id) == 0) {
+            self.idle_since.or(Some(s.now))
+        } else {
+            None
+        };
+        let wait_ms = IDLE_INTERVALS * s.membership.interval_ms();
+        let nobody_works = self
+            .idle_since
+            .is_some_and(|t| s.now.since_ms(t) >= wait_ms);
+        self.astray = is_many && (nobody_works || s.membership.hears_nobody(s.now));
+    }
+
     /// Looks where to wait for what the operator wants next.
     pub fn listen(&mut self, s: &Situation<'_>, order: Order) {
         if !self.waits_at_base(order) {
@@ -733,6 +758,7 @@ impl MissionState {
             company: Company::begun(old.is_none(), me, config, durable),
             alone: false,
             finished: false,
+            idle_since: None,
             astray: false,
             listening: Listening::default(),
             silent: false,

@@ -23,7 +23,7 @@
 //! | task_given | it holds a task whose flight is planned |
 //! | cells_given | its plan has cells |
 //! | all_seen | everything is seen, whatever tasks are open |
-//! | nobody_heard | it knew many, and hears nobody |
+//! | nobody_heard | it knew many, and hears nobody, or has heard of nobody with cells to fly for 20 T' and has none itself |
 //! | otherwise | always |
 
 use crate::diagram::{Machine, MissionEvent, Part, State, StateGoal};

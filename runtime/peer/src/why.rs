@@ -49,7 +49,7 @@ pub enum Reason {
     Plan,
     /// Everything is seen, and the mission goes on.
     AllSeen,
-    /// It knew many, has nothing to fly and hears nobody.
+    /// It knew many, has nothing to fly and hears nobody, or nobody who has.
     Astray,
     /// It has nothing to fly, and others are at work.
     OthersAtWork,
@@ -113,7 +113,7 @@ impl Reason {
             Self::FuelIsDue => "its fuel is due",
             Self::Twin => "another process speaks under its id",
             Self::Relay | Self::Track | Self::Task | Self::Plan | Self::AllSeen => "",
-            Self::Astray => "it has nothing to fly and hears nobody",
+            Self::Astray => "it has nothing to fly and hears nobody, or nobody who has",
             Self::OthersAtWork => "it has nothing to fly, others are at work",
             Self::TimeIsOver => "the time of its mission is over",
             Self::Stayed => "it stayed for as long as it was to",

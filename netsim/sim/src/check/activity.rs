@@ -457,7 +457,7 @@ impl Facts<'_> {
             }
             MissionEvent::CellsGiven => Holds::of(!view.plan.is_empty()),
             MissionEvent::AllSeen => Holds::of(view.covered.is_full()),
-            MissionEvent::NobodyHeard => Holds::of(view.hears_nobody),
+            MissionEvent::NobodyHeard => Holds::of(view.astray),
             MissionEvent::Otherwise => Holds::Yes,
         }
     }

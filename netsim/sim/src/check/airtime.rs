@@ -12,6 +12,10 @@ const WINDOW_MS: u64 = 10_000;
 /// one of those who were there before.
 const BEFORE_MS: u64 = 16_000;
 
+/// One in so many radios may be missed, the first that it said lost: where many come into one
+/// earshot at once they collide.
+const MISSED_OF: u64 = 30;
+
 /// What the peers of one run transmitted.
 #[derive(Clone, Debug)]
 pub struct AirtimeCheck {
@@ -65,7 +69,7 @@ impl AirtimeCheck {
 
     /// Judges what everybody sent within the window, by the fewest radios in its earshot
     /// (itself included) meanwhile and for so long before that all are heard of, of which it
-    /// may miss one. To the share of that time comes what a full bucket held when it began, and
+    /// may miss one, or one in thirty. To the share of that time comes what a full bucket held when it began, and
     /// one record: the largest goes when the bucket is full, and what it lacked is owed. Whoever
     /// follows a newer mission than somebody in its component may have borrowed its part of what
     /// all may use, and a period of it.
@@ -88,8 +92,9 @@ impl AirtimeCheck {
             }
             let bytes: u64 = sent.iter().map(|s| s.1).sum();
             let largest = sent.iter().map(|s| s.1).max().unwrap_or(0);
+            let counted = |radios: u64| radios - (radios / MISSED_OF).max(1);
             let share_ps =
-                |radios: u64| self.rate_bps / 8 * SHARE_PERCENT / 100 / (radios - 1).max(1);
+                |radios: u64| self.rate_bps / 8 * SHARE_PERCENT / 100 / counted(radios).max(1);
             let burst = share_ps(fewest) * self.burst_ms / 1000;
             // A clock that jumps within the window fills the bucket once more.
             let from_ms = now_ms.saturating_sub(WINDOW_MS);

@@ -90,7 +90,7 @@ pub enum MissionEvent {
     CellsGiven,
     /// Everything is seen, whatever tasks are open.
     AllSeen,
-    /// It knew many, and hears nobody.
+    /// It knew many, and hears nobody, or for long nobody who has cells to fly.
     NobodyHeard,
     /// Always.
     Otherwise,

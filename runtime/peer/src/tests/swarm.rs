@@ -1,12 +1,15 @@
 //! How a few peers share, lose and take over.
 
 use super::{covered, with_operator};
+use crate::input::{Command, NewTask, TaskEdit};
 use crate::output::{Report, Status};
 use crate::protocol::runs::unpack;
 use crate::testing::{GROUND_STATION, Harness, mission};
+use crate::why::Reason;
 use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
 use crate::wire::message::{Activity, MissionStatus};
+use crate::wire::tasks::TaskKind;
 use crate::{Input, PeerId};
 use skein_behaviors::Order;
 use skein_geometry::frame::{Point, Pose};
@@ -157,6 +160,46 @@ fn who_hears_nobody_of_many_and_has_nothing_to_fly_goes_home() {
             "{many}: {before_m:.0} m, then {after_m:.0} m"
         );
     }
+}
+
+/// One is on its way to a place far away and out of reach; nobody else has anything to fly, and
+/// whether it was there those will hear where it comes home to.
+#[test]
+fn of_many_who_wait_for_nobody_who_has_cells_wait_at_the_base() {
+    let mut h = Harness::with_roster(12, mission(1, 16, 12));
+    h.add_ground_station(Some(mission(1, 16, 12)));
+    (1..=12).for_each(|id| h.start(id));
+    h.start(GROUND_STATION);
+    let far = NewTask {
+        name: Some("far".to_owned()),
+        kind: TaskKind::Pinpoint,
+        places: vec![(5_000_000, 4_000_000)],
+        radius_mm: 3_000,
+        worth: 100,
+        within_ms: None,
+        sensor: 0,
+    };
+    h.run_s(20);
+    h.feed(
+        GROUND_STATION,
+        Input::Command(Command::Task(TaskEdit::Add(far))),
+    );
+    let flies = |h: &Harness, id: u16| h.why(id).work.is_some_and(|w| w.reason == Reason::Task);
+    assert!(h.run_until(60, |h| (1..=12).any(|id| flies(h, id))));
+    let doer = (1..=12).find(|id| flies(&h, *id)).unwrap();
+    h.isolate(doer, true);
+    let others = (1..=12).filter(|id| *id != doer);
+    let others: Vec<u16> = others.collect();
+    let idle = |h: &Harness| others.iter().all(|id| h.beliefs(*id).plan.is_empty());
+    let seen = |h: &Harness| h.beliefs(GROUND_STATION).covered.is_full();
+    assert!(h.run_until(200, |h| seen(h) && idle(h)));
+    let base = Point::new(-60.0, -60.0);
+    let away_m = |h: &Harness, id: u16| (h.pose(id).position() - base).norm();
+    let waits = |h: &Harness, id: u16| flies(h, id) || away_m(h, id) < 100.0;
+    let all_wait = |h: &Harness| others.iter().all(|id| waits(h, *id));
+    assert!(!all_wait(&h));
+    assert!(h.run_until(150, all_wait));
+    assert!(others.iter().all(|id| !h.beliefs(*id).finished));
 }
 
 #[test]
