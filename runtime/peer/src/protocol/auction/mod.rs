@@ -14,7 +14,7 @@
 //! |---|---|---|---|
 //! | open | the settlement gives it to this peer | tentative | said |
 //! | tentative | the settlement gives it to another; revised, cancelled, done by another | open | said |
-//! | tentative | the UAV is free, it is first in the order, nobody claims it, and all who live have the same basis, or the basis is as old as two ways through the component | committed | said, flown |
+//! | tentative | the UAV is free, it is first in the order, nobody claims it, and all who live have the same basis, or the basis is as old as two ways through the component, or none became as old in twice that time | committed | said, flown |
 //! | committed | begun | begun | said |
 //! | committed, begun | revised, cancelled; done by another; claimed by one who goes before | open | dropped at the next waypoint |
 //! | committed | all who live have the same basis, by which everybody together gains a tenth if it is another's | open | dropped |
@@ -69,6 +69,9 @@ pub const KNOWN_MAX: usize = 256;
 
 /// A committed task moves if all together gain so many hundredths.
 const WORTH_MOVING_PERCENT: u64 = 110;
+
+/// So many times as long as a basis is to stand is waited for one that does.
+const RESTLESS_PATIENCES: u32 = 2;
 
 /// Version of a bundle: life, then number within it.
 pub type Version = (Incarnation, u32);
@@ -146,6 +149,9 @@ pub struct Auction {
     quiet: u32,
     /// So many are enough to commit without having heard from everybody.
     patience: u32,
+    /// Periods since tasks changed, or since it could last commit, in which the basis never
+    /// stood for as long as that.
+    restless: u32,
     /// What somebody said to have done, in which revision: a later life forgets it, this does
     /// not.
     known_done: BTreeSet<DoneTask>,
@@ -179,6 +185,7 @@ impl Auction {
             free: false,
             quiet: 0,
             patience: u32::MAX,
+            restless: 0,
             known_done: BTreeSet::new(),
             map: 0,
             cells_open: false,
@@ -282,7 +289,12 @@ impl Auction {
         effects.extend(self.drop_to_cover());
         self.settle_anew(settler);
         effects.extend(self.give_up_moving(settler));
-        effects.extend(self.commit());
+        let is_restless = self.restless >= self.restless_most();
+        if is_restless {
+            self.restless = 0;
+            self.settle(settler);
+        }
+        effects.extend(self.commit(is_restless));
         let to_say = self.to_say();
         if self.said != to_say {
             self.said = to_say;
@@ -387,6 +399,11 @@ impl Auction {
             Event::Period(diameter) => {
                 self.patience = 2 * u32::from(diameter) + 3;
                 self.quiet = (self.quiet + 1).min(self.patience);
+                self.restless = if self.quiet == self.patience || self.is_agreed() {
+                    0
+                } else {
+                    self.restless.saturating_add(1)
+                };
                 self.too_many = if self.is_one_too_many() {
                     self.too_many.saturating_add(1)
                 } else {
@@ -394,6 +411,7 @@ impl Auction {
                 };
                 // Nothing else changes with time.
                 return self.quiet == self.patience
+                    || self.restless >= self.restless_most()
                     || self.is_due
                     || self.has_more_to_say()
                     || self.too_many >= self.patience;
@@ -409,6 +427,7 @@ impl Auction {
             // That a task was done changes nothing for who knows it already.
             self.stale |= task.state != TaskState::Done || !self.is_done(id);
             self.tasks.insert(id, task);
+            self.restless = 0;
         }
         newer
     }
@@ -646,9 +665,15 @@ impl Auction {
         effects
     }
 
+    /// After so many restless periods offers of when the tasks changed have crossed the component
+    /// twice, both ways. Where some come and go all the time nothing would ever be flown.
+    fn restless_most(&self) -> u32 {
+        self.patience.saturating_mul(RESTLESS_PATIENCES)
+    }
+
     /// Commits to the next task, where the UAV waits for one and nobody else may have it.
-    fn commit(&mut self) -> Vec<Effect> {
-        let may = self.is_agreed() || self.quiet >= self.patience;
+    fn commit(&mut self, is_restless: bool) -> Vec<Effect> {
+        let may = is_restless || self.is_agreed() || self.quiet >= self.patience;
         let is_free = |t: &BundleTask| {
             let won = t.progress == Progress::Tentative;
             let claim = self.claim_of_another(t.task);

@@ -397,3 +397,38 @@ proptest! {
         }
     }
 }
+
+/// Of many some are given up and heard again all the time, and others offer anew for it.
+#[test]
+fn where_no_basis_ever_stands_a_task_is_committed_to_all_the_same() {
+    let mut s = Swarm::new(&[&[10], &[3], &[2]]);
+    let task = Event::Task(name(0), task(TaskKind::Pinpoint, 2));
+    let _ = s.tell(0, task);
+    let _ = s.tell(0, Event::Free);
+    let mut flown = Vec::new();
+    for period in 1..=20_u32 {
+        for other in [1, 2] {
+            let offer = Offer {
+                east_mm: 3,
+                north_mm: i32::try_from(period).unwrap(),
+                ..OFFER
+            };
+            let bundle = Bundle {
+                offer,
+                ..Bundle::default()
+            };
+            let _ = s.tell(0, Event::Heard(PeerId(other), (2, period), bundle));
+        }
+        assert!(!s.peers[0].is_agreed());
+        let effects = s.tell(0, Event::Period(1));
+        flown.extend(
+            effects
+                .iter()
+                .filter(|e| matches!(e, Effect::Fly(_)))
+                .map(|_| period),
+        );
+    }
+    // Two ways through a component of one hop, with what is lost on the way: five periods.
+    assert_eq!(flown, [10]);
+    assert_eq!(s.holds(0), [(0, Committed)]);
+}
