@@ -8,7 +8,9 @@ use skein_peer::cells::CellSet;
 use skein_peer::output::Status;
 use skein_peer::protocol::launches::Planned;
 use skein_peer::protocol::runs::cells_of;
+use skein_peer::wire::limits::PLAN_MAX;
 use skein_peer::wire::message::{Claim, ListedRun, Stamp};
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -28,8 +30,13 @@ struct Orphan {
     claimant: Option<u16>,
     /// When all who are to list it last took it to be planned by one that is out of their reach.
     heeded_ms: u64,
+    /// When nobody had room for it last.
+    full_ms: u64,
     told: bool,
 }
+
+/// Who may spend less is not asked to fly to cells that others left.
+const LITTLE_FUEL_MS: u32 = 60_000;
 
 /// What listing found out in one run.
 #[derive(Clone, Debug, Default)]
@@ -170,16 +177,39 @@ impl ListingCheck {
         let expected = self.expected(snapshot, able_since_ms);
         self.note_claims_of_the_dead(snapshot, members, lists);
         let heeded = self.claimed_by_who_left(snapshot, lists);
+        let is_full = OnceCell::new();
         for (cell, lister) in (0..).zip(lister) {
             if lister.is_none() && expected.contains(cell) {
                 self.orphans.remove(&cell);
             } else if settled.contains(cell) || lister.is_some() {
                 self.settle(snapshot, cell, lister, members, counts_from_ms, found);
             } else {
-                let at = (cell, heeded.contains(cell));
+                let is_full = *is_full.get_or_init(|| self.nobody_has_room(snapshot, lists));
+                let at = (cell, heeded.contains(cell), is_full);
                 self.orphaned(snapshot, at, members, counts_from_ms, found);
             }
         }
+    }
+
+    /// Whether of those who are to list cells some have said as many runs as a claim has room for,
+    /// and list the others as these are flown, and the rest have no fuel to speak of.
+    fn nobody_has_room(
+        &self,
+        snapshot: &Snapshot<'_>,
+        lists: impl Fn(&PeerSnapshot) -> bool,
+    ) -> bool {
+        let mut newest: BTreeMap<u16, (Version, bool)> = BTreeMap::new();
+        for ((_, author), (claim, version)) in &self.heard {
+            let is_full = claim.loop_hash == snapshot.loop_hash && claim.plan.len() >= PLAN_MAX;
+            let known = newest.entry(*author).or_insert((*version, is_full));
+            if *version > known.0 {
+                *known = (*version, is_full);
+            }
+        }
+        let is_full = |m: &&PeerSnapshot| newest.get(&m.speaks_as).is_some_and(|n| n.1);
+        let able = || snapshot.able().filter(|m| lists(m));
+        able().any(|m| is_full(&m))
+            && able().all(|m| is_full(&m) || m.view.spendable_ms < LITTLE_FUEL_MS)
     }
 
     /// The sections of whom the roster names and nobody able has heard of, for as long as
@@ -271,7 +301,8 @@ impl ListingCheck {
             let from_ms = counted_from(&o, members)
                 .unwrap_or(snapshot.now_ms)
                 .max(counts_from_ms)
-                .max(o.heeded_ms);
+                .max(o.heeded_ms)
+                .max(o.full_ms);
             found.took(
                 "L2",
                 snapshot.grade(),
@@ -288,7 +319,7 @@ impl ListingCheck {
     fn orphaned(
         &mut self,
         snapshot: &Snapshot<'_>,
-        (cell, is_heeded): (u16, bool),
+        (cell, is_heeded, is_full): (u16, bool, bool),
         members: &Membership,
         counts_from_ms: u64,
         found: &mut Findings,
@@ -311,16 +342,21 @@ impl ListingCheck {
             owner,
             claimant: None,
             heeded_ms: 0,
+            full_ms: 0,
             told: false,
         });
         if is_heeded {
             o.heeded_ms = snapshot.now_ms;
+        }
+        if is_full {
+            o.full_ms = snapshot.now_ms;
         }
         // One after the other may have claimed it and died.
         o.claimant = self.claimed_by_dead.get(&cell).copied().or(o.claimant);
         let Some(from_ms) = counted_from(o, members) else {
             return;
         };
+        let from_ms = from_ms.max(o.full_ms);
         let counts_from_ms = from_ms.max(counts_from_ms).max(o.heeded_ms);
         let took_ms = snapshot.now_ms.saturating_sub(counts_from_ms);
         let bound_ms = snapshot.takeover_ms(counts_from_ms);
@@ -465,6 +501,8 @@ mod tests {
         alone: Option<u16>,
         /// What everybody but that one believes of others besides.
         others: Vec<(u16, Status)>,
+        /// What each may spend.
+        fuel_ms: u32,
     }
 
     impl Story {
@@ -478,6 +516,7 @@ mod tests {
                 diameter: 1,
                 alone: None,
                 others: Vec::new(),
+                fuel_ms: 0,
             }
         }
 
@@ -512,6 +551,7 @@ mod tests {
                         plan: plan.to_vec(),
                         stamps: vec![stamp(5, *id); plan.len()],
                         peers: self.believed(*id),
+                        spendable_ms: self.fuel_ms,
                         ..Beliefs::default()
                     },
                 })
@@ -600,6 +640,30 @@ mod tests {
             s.found.counts.contains_key("L2"),
             "somebody has heard of it"
         );
+    }
+
+    #[test]
+    fn what_no_claim_has_room_for_waits_unless_somebody_else_has_fuel() {
+        let run = |first| ListedRun {
+            run: CellRun { first, count: 1 },
+            backward: false,
+            stamp: stamp(5, 1),
+        };
+        for (runs, fuel_ms, broken) in [(15, 0, true), (16, 0, false), (16, LITTLE_FUEL_MS, true)] {
+            let mut s = Story::new(0);
+            s.fuel_ms = fuel_ms;
+            let claim = Claim {
+                loop_hash: 9,
+                plan: (0..runs).map(run).collect(),
+                ..Claim::default()
+            };
+            s.check.on_heard((2, 1), (1, 1), &Arc::new(claim));
+            for t in 0..30 {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
+            }
+            let found = s.found.counts.contains_key("L2");
+            assert_eq!(found, broken, "{runs} runs, {fuel_ms} ms");
+        }
     }
 
     #[test]
