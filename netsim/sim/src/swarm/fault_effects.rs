@@ -357,6 +357,8 @@ impl Swarm {
                 ..v
             })
         };
+        // What is due now follows from the time, not from the bytes.
+        self.feed(idx, Input::Timer);
         let before = believes(self);
         self.spoilt = true;
         let input = Input::Received {
