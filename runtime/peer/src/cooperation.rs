@@ -452,7 +452,7 @@ impl Cooperation {
         effects.extend(state.negotiate(s, able, timers));
         effects.extend(self.tasking.tick(s, order, state));
         effects.extend(state.notice_end(s, timers));
-        state.look_for_company(s);
+        state.notice_astray(s);
         state.silent = s.is_silent;
         state.listen(s, order);
         state.steer_by_state(s.now, order);

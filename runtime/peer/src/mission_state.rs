@@ -645,7 +645,7 @@ impl MissionState {
 
     /// Looks whether to wait where it is leads to anything: among many that hear no more than a
     /// part of each other the rest may be done, and whoever is done is at the base.
-    pub fn look_for_company(&mut self, s: &Situation<'_>) {
+    pub fn notice_astray(&mut self, s: &Situation<'_>) {
         let is_many = are_many(s.membership.uavs());
         let sections = &self.negotiation.sections;
         let waits = is_many && sections.plan().is_empty();

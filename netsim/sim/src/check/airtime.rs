@@ -69,10 +69,10 @@ impl AirtimeCheck {
 
     /// Judges what everybody sent within the window, by the fewest radios in its earshot
     /// (itself included) meanwhile and for so long before that all are heard of, of which it
-    /// may miss one, or one in thirty. To the share of that time comes what a full bucket held when it began, and
-    /// one record: the largest goes when the bucket is full, and what it lacked is owed. Whoever
-    /// follows a newer mission than somebody in its component may have borrowed its part of what
-    /// all may use, and a period of it.
+    /// may miss one, or one in thirty. To the share of that time comes what a full bucket held
+    /// when it began, and one record: the largest goes when the bucket is full, and what it
+    /// lacked is owed. Whoever follows a newer mission than somebody in its component may have
+    /// borrowed its part of what all may use, and a period of it.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let now_ms = snapshot.now_ms;
         let old = |t: &(u64, u64)| t.0 + WINDOW_MS < now_ms;
