@@ -2,18 +2,17 @@
 //! a peer is lost.
 
 use super::crowds::{self, SECTOR};
-use super::{record, with_operator};
+use super::{add, point, record, with_operator};
 use crate::diagram::{
     Action, Behaviour, Diagram, MissionEvent, Part, Purpose, State, StateGoal, Transition,
 };
-use crate::input::{Command, NewTask, TaskEdit};
+use crate::input::Command;
 use crate::mission::Mission;
 use crate::output::{Status, TaskNews};
 use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::why::{Reason, Work};
 use crate::wire::codec::Body;
 use crate::wire::message::Finished;
-use crate::wire::tasks::TaskKind;
 use crate::{Input, Report};
 use std::sync::Arc;
 
@@ -159,19 +158,7 @@ fn a_mission_ends_by_its_timer_whatever_is_seen() {
 fn what_the_mission_leads_nobody_to_is_let_go_and_that_is_said() {
     let mut h = with_operator(1, patrol(40));
     h.run_s(34);
-    let task = NewTask {
-        name: Some("gate".into()),
-        kind: TaskKind::Pinpoint,
-        places: vec![(2_000_000, 2_000_000)],
-        radius_mm: 10_000,
-        worth: 100,
-        within_ms: None,
-        sensor: 0,
-    };
-    h.feed(
-        GROUND_STATION,
-        Input::Command(Command::Task(TaskEdit::Add(task))),
-    );
+    add(&mut h, point("gate", 2_000.0, 2_000.0));
     assert!(h.run_until(5, |h| work(h, 1).reason == Reason::Task));
     // The time of the mission is over before it is there.
     assert!(h.run_until(30, |h| work(h, 1).reason == Reason::TimeIsOver));

@@ -16,11 +16,14 @@ mod tasks;
 mod twins;
 mod zones;
 
-use crate::mission::Mission;
+use crate::Input;
+use crate::input::{Command, NewTask, TaskEdit};
+use crate::mission::{Mission, mm};
 use crate::testing::{GROUND_STATION, Harness};
 use crate::wire::codec::{self, Body};
 use crate::wire::message::{Beacon, Record};
 use crate::wire::samples;
+use crate::wire::tasks::TaskKind;
 
 /// The bytes of a record.
 fn record(author: u16, incarnation: u32, seq: u32, subject: u16, body: &Body) -> Vec<u8> {
@@ -57,4 +60,27 @@ fn with_operator(n: u16, mission: Mission) -> Harness {
 /// Cells that a peer knows to be covered.
 fn covered(h: &Harness, id: u16) -> usize {
     usize::from(h.beliefs(id).covered.count())
+}
+
+/// A place that is to be seen, from within ten metres.
+fn point(name: &str, east_m: f64, north_m: f64) -> NewTask {
+    NewTask {
+        name: Some(name.to_owned()),
+        kind: TaskKind::Pinpoint,
+        places: vec![(mm(east_m), mm(north_m))],
+        radius_mm: 10_000,
+        worth: 100,
+        within_ms: None,
+        sensor: 0,
+    }
+}
+
+/// The operator says something of tasks.
+fn edit(h: &mut Harness, edit: TaskEdit) {
+    h.feed(GROUND_STATION, Input::Command(Command::Task(edit)));
+}
+
+/// The operator asks for a task.
+fn add(h: &mut Harness, task: NewTask) {
+    edit(h, TaskEdit::Add(task));
 }

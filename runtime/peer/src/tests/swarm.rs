@@ -1,7 +1,6 @@
 //! How a few peers share, lose and take over.
 
-use super::{covered, with_operator};
-use crate::input::{Command, NewTask, TaskEdit};
+use super::{add, covered, point, with_operator};
 use crate::output::{Report, Status};
 use crate::protocol::runs::unpack;
 use crate::testing::{GROUND_STATION, Harness, mission};
@@ -9,7 +8,6 @@ use crate::why::Reason;
 use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
 use crate::wire::message::{Activity, MissionStatus};
-use crate::wire::tasks::TaskKind;
 use crate::{Input, PeerId};
 use skein_behaviors::Order;
 use skein_geometry::frame::{Point, Pose};
@@ -170,20 +168,8 @@ fn of_many_who_wait_for_nobody_who_has_cells_wait_at_the_base() {
     h.add_ground_station(Some(mission(1, 16, 12)));
     (1..=12).for_each(|id| h.start(id));
     h.start(GROUND_STATION);
-    let far = NewTask {
-        name: Some("far".to_owned()),
-        kind: TaskKind::Pinpoint,
-        places: vec![(5_000_000, 4_000_000)],
-        radius_mm: 3_000,
-        worth: 100,
-        within_ms: None,
-        sensor: 0,
-    };
     h.run_s(20);
-    h.feed(
-        GROUND_STATION,
-        Input::Command(Command::Task(TaskEdit::Add(far))),
-    );
+    add(&mut h, point("far", 5_000.0, 4_000.0));
     let flies = |h: &Harness, id: u16| h.why(id).work.is_some_and(|w| w.reason == Reason::Task);
     assert!(h.run_until(60, |h| (1..=12).any(|id| flies(h, id))));
     let doer = (1..=12).find(|id| flies(&h, *id)).unwrap();

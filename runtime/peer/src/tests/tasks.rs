@@ -1,10 +1,8 @@
 //! Tasks other than coverage, asked for in flight: who does them, what is said, and that all
 //! cells are seen all the same.
 
-use super::{covered, record, with_operator};
-use crate::Input;
-use crate::input::{Command, NewTask, TaskEdit};
-use crate::mission::mm;
+use super::{add, covered, edit, point, record, with_operator};
+use crate::input::{NewTask, TaskEdit};
 use crate::output::{Report, TaskNews};
 use crate::task_desk::TaskView;
 use crate::testing::{GROUND_STATION, Harness, mission};
@@ -12,26 +10,6 @@ use crate::why::Reason;
 use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
 use crate::wire::tasks::{TaskKind, TaskState};
-
-fn point(name: &str, east_m: f64, north_m: f64) -> NewTask {
-    NewTask {
-        name: Some(name.to_owned()),
-        kind: TaskKind::Pinpoint,
-        places: vec![(mm(east_m), mm(north_m))],
-        radius_mm: 10_000,
-        worth: 100,
-        within_ms: None,
-        sensor: 0,
-    }
-}
-
-fn edit(h: &mut Harness, edit: TaskEdit) {
-    h.feed(GROUND_STATION, Input::Command(Command::Task(edit)));
-}
-
-fn add(h: &mut Harness, task: NewTask) {
-    edit(h, TaskEdit::Add(task));
-}
 
 fn view(h: &Harness, at: u16, name: &str) -> Option<TaskView> {
     let tasks = h.why(at).tasks;
