@@ -124,6 +124,14 @@ pub struct Extension {
     rest_arrives: Option<f64>,
 }
 
+impl Extension {
+    /// Whether it gets to a cell that is to be seen, or to where it is to wait.
+    #[must_use]
+    pub fn gets_there(&self) -> bool {
+        self.arrives || self.moves.iter().any(|step| step.serves().is_some())
+    }
+}
+
 impl Executive {
     /// The same, flying by promises.
     #[must_use]
@@ -414,7 +422,13 @@ impl Executive {
         let end_m = self.flight_end_m();
         let is_unwanted = c.wanted_m < end_m;
         let is_short = end_m - at_m < REFILL_S * self.speed_mps();
-        let has_goal = match self.aim {
+        (is_unwanted || is_short) && self.is_under_way()
+    }
+
+    /// Whether there is anything to fly to that is not agreed yet.
+    #[must_use]
+    pub fn is_under_way(&self) -> bool {
+        match self.aim {
             Aim::Hold
             | Aim::Circle(_)
             | Aim::Round
@@ -423,9 +437,8 @@ impl Executive {
             | Aim::Given
             | Aim::Detour => false,
             Aim::Legs => !self.queue.is_empty(),
-            Aim::Point(_) => !c.arrived,
-        };
-        (is_unwanted || is_short) && has_goal
+            Aim::Point(_) => self.contingency.as_ref().is_some_and(|c| !c.arrived),
+        }
     }
 
     /// Whether it circles at a time, in milliseconds: all that was agreed is flown.

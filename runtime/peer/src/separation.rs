@@ -32,7 +32,7 @@ use crate::why::Agreed;
 use crate::wire::codec::Body;
 use crate::wire::message::{Member, Record};
 use crate::{Incarnation, PeerId};
-use held_up::HeldUp;
+use held_up::{Found, HeldUp};
 use identity::Identity;
 use passing::{Gist, Passing};
 use silence::{Silence, ends_ms};
@@ -378,7 +378,14 @@ impl Separation {
             } else {
                 clear
             };
-            self.held_up.looked(now_ms, clear.is_some(), nth.is_some());
+            let gets_there = |nth: usize| ways.get(nth).is_some_and(Extension::gets_there);
+            let found = match (clear, nth) {
+                (Some(nth), _) if gets_there(nth) => Found::There,
+                (Some(_), _) => Found::Way,
+                (None, Some(_)) => Found::Shown,
+                (None, None) => Found::Nothing,
+            };
+            self.held_up.looked(now_ms, found);
             if executive.stands() {
                 executive.is_held_up(nth.is_none());
             }
@@ -387,6 +394,8 @@ impl Separation {
                 self.is_news = true;
                 return;
             }
+        } else if executive.is_under_way() {
+            self.held_up.looked(now_ms, Found::Way);
         } else {
             self.held_up = HeldUp::default();
         }

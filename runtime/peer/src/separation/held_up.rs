@@ -1,5 +1,5 @@
 //! Who finds no way that is clear, on a launcher or in flight: when it shows others what they
-//! hold up (decisions 117 and 132).
+//! hold up (decisions 117, 132 and 159).
 
 /// Who has no clear way shows others what they hold up after so long, milliseconds: by then who
 /// has somewhere to go is gone.
@@ -9,38 +9,55 @@ const HELD_UP_MS: u64 = 5_000;
 /// seconds of flight.
 const PLEAD_AGAIN_MS: u64 = 10_000;
 
+/// What a look for the next flight found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Found {
+    /// Nothing that is clear.
+    Nothing,
+    /// Nothing that is clear, and what others hold up is shown to them.
+    Shown,
+    /// A clear way that gets to no cell: it may lead round to where it was held up.
+    Way,
+    /// A clear way that gets to where it wants to.
+    There,
+}
+
 /// How long it has been without a clear way.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct HeldUp {
-    held_up_since_ms: Option<u64>,
-    pleaded_ms: Option<u64>,
+    /// Since when it looks in vain.
+    since_ms: Option<u64>,
+    /// Since when it was held up for the first time on the way to where it wants to.
+    first_ms: Option<u64>,
+    shown_ms: Option<u64>,
 }
 
 impl HeldUp {
     /// Whether others are to be shown what they hold up.
     pub fn is_due(self, now_ms: u64) -> bool {
-        let long_ms = self.held_up_since_ms.map_or(0, |since| now_ms - since);
-        let lately = self
-            .pleaded_ms
-            .is_some_and(|at| now_ms < at + PLEAD_AGAIN_MS);
+        let long_ms = self.first_ms.map_or(0, |since| now_ms - since);
+        let lately = self.shown_ms.is_some_and(|at| now_ms < at + PLEAD_AGAIN_MS);
         long_ms >= HELD_UP_MS && !lately
     }
 
     /// For how long it has found none, milliseconds.
     pub fn since_ms(self, now_ms: u64) -> Option<u64> {
-        let since = self.held_up_since_ms?;
+        let since = self.since_ms?;
         Some(now_ms.saturating_sub(since))
     }
 
     /// It has looked for a way.
-    pub fn looked(&mut self, now_ms: u64, is_clear: bool, offers: bool) {
-        if is_clear {
-            *self = Self::default();
-            return;
+    pub fn looked(&mut self, now_ms: u64, found: Found) {
+        match found {
+            Found::There => *self = Self::default(),
+            Found::Way => self.since_ms = None,
+            Found::Nothing | Found::Shown => {
+                self.since_ms.get_or_insert(now_ms);
+                self.first_ms.get_or_insert(now_ms);
+            }
         }
-        self.held_up_since_ms.get_or_insert(now_ms);
-        if offers {
-            self.pleaded_ms = Some(now_ms);
+        if found == Found::Shown {
+            self.shown_ms = Some(now_ms);
         }
     }
 }
@@ -50,22 +67,42 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_pleads_after_five_seconds_and_every_ten_until_a_way_is_clear() {
+    fn it_shows_what_others_hold_up_after_five_seconds_and_every_ten_until_it_gets_there() {
         let mut held_up = HeldUp::default();
-        let mut pleaded = Vec::new();
+        let mut shown = Vec::new();
         for now_ms in (0..30_000).step_by(1_000) {
-            let pleads = held_up.is_due(now_ms);
-            if pleads {
-                pleaded.push(now_ms);
-            }
-            held_up.looked(now_ms, false, pleads);
+            let found = if held_up.is_due(now_ms) {
+                shown.push(now_ms);
+                Found::Shown
+            } else {
+                Found::Nothing
+            };
+            held_up.looked(now_ms, found);
         }
-        assert_eq!(pleaded, [5_000, 15_000, 25_000]);
+        assert_eq!(shown, [5_000, 15_000, 25_000]);
         assert_eq!(held_up.since_ms(29_000), Some(29_000));
-        held_up.looked(30_000, true, true);
+        held_up.looked(30_000, Found::There);
         assert!(!held_up.is_due(31_000) && !held_up.is_due(60_000));
         assert_eq!(held_up.since_ms(31_000), None);
-        held_up.looked(60_000, false, false);
+        held_up.looked(60_000, Found::Nothing);
         assert!(!held_up.is_due(64_000) && held_up.is_due(65_000));
+    }
+
+    /// Seed 923007 of the default mission at one height: it flew the way round to its last cell
+    /// four times, 25 s each, and was held up for four seconds at the end of each, by one who
+    /// circled with nothing to do.
+    #[test]
+    fn who_is_led_round_to_where_it_was_held_up_shows_it_at_once() {
+        let mut held_up = HeldUp::default();
+        for now_ms in [1_000, 2_000, 3_000, 4_000] {
+            held_up.looked(now_ms, Found::Nothing);
+        }
+        held_up.looked(5_000, Found::Way);
+        assert_eq!(held_up.since_ms(6_000), None);
+        held_up.looked(12_000, Found::Way);
+        assert!(held_up.is_due(29_000));
+        held_up.looked(29_000, Found::Shown);
+        assert_eq!(held_up.since_ms(30_000), Some(1_000));
+        assert!(!held_up.is_due(38_000));
     }
 }
