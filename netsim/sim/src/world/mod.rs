@@ -471,10 +471,12 @@ impl World {
         self.body(uav)?.percept()
     }
 
-    /// What a UAV senses now; nothing once it is lost.
+    /// What the computer with this number is told by the sensors of its airframe now; nothing
+    /// once that is lost. All in one airframe are told the same.
     #[must_use]
-    pub fn percept(&self, uav: u16) -> Option<Percept> {
-        let body = self.body(uav)?;
+    pub fn percept(&self, number: u16) -> Option<Percept> {
+        let Uav { id: uav, body, .. } = self.uav(number)?;
+        let uav = *uav;
         let ground_ms = body.takes_off_in_ms(self.now_ms);
         let own = self.weather.sensed(body.percept()?, self.seed, uav);
         let attitude = own.attitude;
@@ -796,6 +798,7 @@ mod tests {
     #[test]
     fn an_airframe_has_one_commander_until_that_is_quiet() {
         let mut spec = fixture::square(2);
+        spec.traffic_range_m = 5_000.0;
         let mut second = spec.uavs[1].clone();
         (second.id, second.twin_of, second.aboard) = (7, Some(2), true);
         spec.uavs.push(second);
@@ -807,6 +810,8 @@ mod tests {
             w.advance(t + 500);
         }
         assert_eq!(w.percept(7), w.percept(2));
+        let senses: Vec<u16> = w.percept(7).unwrap().traffic.seen().map(|s| s.id).collect();
+        assert_eq!(senses, [1], "nobody senses itself");
         assert!(w.antenna(7).is_some() && w.antenna(7) == w.antenna(2));
         // Its radio ends with its computer, and the other one flies when the failsafe is due.
         w.set_computer(2, false);
