@@ -6,7 +6,7 @@
 //! |---|---|
 //! | operator_hold, operator_return | that is the standing order to it |
 //! | mission_cancelled | the operator ended the mission |
-//! | mission_complete | all is seen, and no task is open that somebody can do |
+//! | mission_complete | all is seen, and no task is open that somebody can do; none at all where a timer ends the mission |
 //! | low_fuel | its fuel is due (`fuel.rs`) |
 //! | twin_speaks | another process has silenced it |
 //! | timer | it follows this sortie for so long in this life, or of a timer that ends the mission: another peer of it said finished |
@@ -139,7 +139,12 @@ impl Stage {
     /// Somebody who follows this mission says that it is finished: where its time ends it, that
     /// is over for all.
     pub fn hear_finished(&mut self) {
-        self.told_over |= self.machine.ends_after_s().is_some();
+        self.told_over |= self.ends_by_time();
+    }
+
+    /// Whether a timer ends the mission.
+    pub fn ends_by_time(&self) -> bool {
+        self.machine.ends_after_s().is_some()
     }
 }
 

@@ -245,14 +245,16 @@ impl Tasking {
     }
 
     /// Whether a task is open that somebody can do, as far as is known; a relay position keeps
-    /// nobody in the air but who holds it.
-    pub fn has_work(&self) -> bool {
+    /// nobody in the air but who holds it. Where its time ends the mission it is open for who can
+    /// do nothing, too: others may, and are told by `finished` that the time is over.
+    fn has_work(&self, ends_by_time: bool) -> bool {
         let hopeless = self.auction.unassigned();
+        let hopeless = |id: &TaskId| !ends_by_time && hopeless.contains(id);
         let mine = |id: &TaskId| self.flown() == Some(*id);
         let mut open = self.known.iter().filter(|(_, k)| k.is_open());
         // What a mission brings is a part of it.
         let keeps = |id: &TaskId, k: &Known| !k.task.is_held() || is_brought(*id) || mine(id);
-        open.any(|(id, k)| !hopeless.contains(id) && keeps(id, k))
+        open.any(|(id, k)| !hopeless(id) && keeps(id, k))
     }
 
     /// What it holds, and what of all it knows to be open that somebody can do.
@@ -453,7 +455,7 @@ impl Tasking {
         effects.extend(self.speak(s));
         effects.extend(self.tell_of_targets(s));
         effects.extend(self.tell_of_counts(s, state));
-        state.has_tasks = self.has_work();
+        state.has_tasks = self.has_work(state.stage.ends_by_time());
         state.target_lost = self.has_lost();
         effects
     }

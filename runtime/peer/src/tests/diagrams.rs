@@ -6,7 +6,7 @@ use super::{add, point, record, with_operator};
 use crate::diagram::{
     Action, Behaviour, Diagram, MissionEvent, Part, Purpose, State, StateGoal, Transition,
 };
-use crate::input::Command;
+use crate::input::{Command, NewTask};
 use crate::mission::Mission;
 use crate::output::{Status, TaskNews};
 use crate::testing::{GROUND_STATION, Harness, mission};
@@ -152,6 +152,29 @@ fn a_mission_ends_by_its_timer_whatever_is_seen() {
         (at.east_m + 60.0).hypot(at.north_m + 60.0)
     };
     assert!(h.run_until(120, |h| away(h) < 60.0), "{}", away(&h));
+}
+
+/// Storm `downtown` 922003: four who were recalled and cut off knew nobody who could follow the
+/// lorry, took the mission for done, and once they were heard again it was over for all, after 67
+/// of 600 s.
+#[test]
+fn what_nobody_can_do_ends_no_mission_before_its_time() {
+    let over = (MissionEvent::Timer, 250);
+    let mission = flown_by(with("over", StateGoal::Home, Part::Ends, over), 1);
+    let mut h = with_operator(2, mission);
+    let heat = NewTask {
+        sensor: 2,
+        ..point("heat", 100.0, 100.0)
+    };
+    h.run_s(15);
+    add(&mut h, heat);
+    let is_covered = |h: &Harness| [1, 2].iter().all(|id| h.beliefs(*id).covered.count() == 24);
+    assert!(h.run_until(200, is_covered));
+    h.run_s(20);
+    let finished = |h: &Harness, id: u16| h.beliefs(id).finished;
+    assert!(!finished(&h, 1) && !finished(&h, 2) && h.now_ms() < 245_000);
+    assert!(h.run_until(250, |h| finished(h, 1) && finished(h, 2)));
+    assert_eq!(work(&h, 1).reason, Reason::TimeIsOver);
 }
 
 #[test]
