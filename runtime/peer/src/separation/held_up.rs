@@ -35,7 +35,9 @@ pub(super) struct HeldUp {
 impl HeldUp {
     /// Whether others are to be shown what they hold up.
     pub fn is_due(self, now_ms: u64) -> bool {
-        let long_ms = self.first_ms.map_or(0, |since| now_ms - since);
+        let long_ms = self
+            .first_ms
+            .map_or(0, |since| now_ms.saturating_sub(since));
         let lately = self.shown_ms.is_some_and(|at| now_ms < at + PLEAD_AGAIN_MS);
         long_ms >= HELD_UP_MS && !lately
     }
