@@ -382,7 +382,7 @@ impl Separation {
             let found = match (clear, nth) {
                 (Some(nth), _) if gets_there(nth) => Found::There,
                 (Some(_), _) => Found::Way,
-                (None, Some(_)) => Found::Shown,
+                (None, Some(_)) => Found::Pleaded,
                 (None, None) => Found::Nothing,
             };
             self.held_up.looked(now_ms, found);

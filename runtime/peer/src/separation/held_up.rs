@@ -15,7 +15,7 @@ pub(super) enum Found {
     /// Nothing that is clear.
     Nothing,
     /// Nothing that is clear, and what others hold up is shown to them.
-    Shown,
+    Pleaded,
     /// A clear way that gets to no cell: it may lead round to where it was held up.
     Way,
     /// A clear way that gets to where it wants to.
@@ -29,7 +29,7 @@ pub(super) struct HeldUp {
     since_ms: Option<u64>,
     /// Since when it was held up for the first time on the way to where it wants to.
     first_ms: Option<u64>,
-    shown_ms: Option<u64>,
+    pleaded_ms: Option<u64>,
 }
 
 impl HeldUp {
@@ -38,7 +38,9 @@ impl HeldUp {
         let long_ms = self
             .first_ms
             .map_or(0, |since| now_ms.saturating_sub(since));
-        let lately = self.shown_ms.is_some_and(|at| now_ms < at + PLEAD_AGAIN_MS);
+        let lately = self
+            .pleaded_ms
+            .is_some_and(|at| now_ms < at + PLEAD_AGAIN_MS);
         long_ms >= HELD_UP_MS && !lately
     }
 
@@ -53,13 +55,13 @@ impl HeldUp {
         match found {
             Found::There => *self = Self::default(),
             Found::Way => self.since_ms = None,
-            Found::Nothing | Found::Shown => {
+            Found::Nothing | Found::Pleaded => {
                 self.since_ms.get_or_insert(now_ms);
                 self.first_ms.get_or_insert(now_ms);
             }
         }
-        if found == Found::Shown {
-            self.shown_ms = Some(now_ms);
+        if found == Found::Pleaded {
+            self.pleaded_ms = Some(now_ms);
         }
     }
 }
@@ -69,19 +71,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_shows_what_others_hold_up_after_five_seconds_and_every_ten_until_it_gets_there() {
+    fn it_pleads_after_five_seconds_and_every_ten_until_it_gets_there() {
         let mut held_up = HeldUp::default();
-        let mut shown = Vec::new();
+        let mut pleaded = Vec::new();
         for now_ms in (0..30_000).step_by(1_000) {
             let found = if held_up.is_due(now_ms) {
-                shown.push(now_ms);
-                Found::Shown
+                pleaded.push(now_ms);
+                Found::Pleaded
             } else {
                 Found::Nothing
             };
             held_up.looked(now_ms, found);
         }
-        assert_eq!(shown, [5_000, 15_000, 25_000]);
+        assert_eq!(pleaded, [5_000, 15_000, 25_000]);
         assert_eq!(held_up.since_ms(29_000), Some(29_000));
         held_up.looked(30_000, Found::There);
         assert!(!held_up.is_due(31_000) && !held_up.is_due(60_000));
@@ -94,7 +96,7 @@ mod tests {
     /// four times, 25 s each, and was held up for four seconds at the end of each, by one who
     /// circled with nothing to do.
     #[test]
-    fn who_is_led_round_to_where_it_was_held_up_shows_it_at_once() {
+    fn who_is_led_round_to_where_it_was_held_up_pleads_at_once() {
         let mut held_up = HeldUp::default();
         for now_ms in [1_000, 2_000, 3_000, 4_000] {
             held_up.looked(now_ms, Found::Nothing);
@@ -103,7 +105,7 @@ mod tests {
         assert_eq!(held_up.since_ms(6_000), None);
         held_up.looked(12_000, Found::Way);
         assert!(held_up.is_due(29_000));
-        held_up.looked(29_000, Found::Shown);
+        held_up.looked(29_000, Found::Pleaded);
         assert_eq!(held_up.since_ms(30_000), Some(1_000));
         assert!(!held_up.is_due(38_000));
     }

@@ -2,7 +2,7 @@
 //! a peer is lost.
 
 use super::crowds::{self, SECTOR};
-use super::{add, point, record, with_operator};
+use super::{add, covered, point, record, with_operator};
 use crate::diagram::{
     Action, Behaviour, Diagram, MissionEvent, Part, Purpose, State, StateGoal, Transition,
 };
@@ -168,7 +168,7 @@ fn what_nobody_can_do_ends_no_mission_before_its_time() {
     };
     h.run_s(15);
     add(&mut h, heat);
-    let is_covered = |h: &Harness| [1, 2].iter().all(|id| h.beliefs(*id).covered.count() == 24);
+    let is_covered = |h: &Harness| [1, 2].iter().all(|id| covered(h, *id) == 24);
     assert!(h.run_until(200, is_covered));
     h.run_s(20);
     let finished = |h: &Harness, id: u16| h.beliefs(id).finished;
