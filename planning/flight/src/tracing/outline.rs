@@ -8,7 +8,7 @@
 //! Stretches merge in any order: equal sets give equal outlines. No place is told that nobody saw.
 //!
 //! # Complexity
-//! Places times pieces of stretches.
+//! Places times the pieces of stretches that lie as far east as they do.
 
 use super::thread::Mark;
 use core::cmp::Ordering;
@@ -133,10 +133,51 @@ struct Piece {
     sided: bool,
 }
 
+impl Piece {
+    /// How far west and east of it a place may be beside which it runs.
+    fn span_m(&self) -> (f64, f64) {
+        let grown_m = if self.sided { GROWN_MOST_M } else { 0.0 };
+        let reach_m = 2.0 * BESIDE_M + grown_m;
+        let (a, b) = (self.from.x, self.from.x + self.way.x);
+        (a.min(b) - reach_m, a.max(b) + reach_m)
+    }
+}
+
+/// Pieces from west to east, in which those beside a place are found.
+struct Pieces {
+    by_west: Vec<(f64, Piece)>,
+    /// The widest span of all, metres.
+    widest_m: f64,
+}
+
+impl Pieces {
+    fn of(stretches: &[Stretch]) -> Self {
+        let (mut by_west, mut widest_m) = (Vec::new(), 0.0_f64);
+        for piece in stretches.iter().flat_map(pieces_of) {
+            let (west_m, east_m) = piece.span_m();
+            widest_m = widest_m.max(east_m - west_m);
+            by_west.push((west_m, piece));
+        }
+        by_west.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Self { by_west, widest_m }
+    }
+
+    /// All that may run beside a place, and others.
+    fn near(&self, at: Point) -> impl Iterator<Item = &Piece> {
+        let least_m = at.x - self.widest_m;
+        let from = self
+            .by_west
+            .partition_point(|(west_m, _)| *west_m < least_m);
+        let spanning = self.by_west.iter().skip(from);
+        let spanning = spanning.take_while(move |(west_m, _)| *west_m <= at.x);
+        spanning.map(|(_, piece)| piece)
+    }
+}
+
 /// What all stretches tell together.
 #[must_use]
 pub fn outline(stretches: &[Stretch]) -> Outline {
-    let pieces: Vec<Piece> = stretches.iter().flat_map(pieces_of).collect();
+    let pieces = Pieces::of(stretches);
     let mut runs: Vec<(Vec<Mark>, bool)> = Vec::new();
     for stretch in stretches {
         let mut run: Vec<Mark> = Vec::new();
@@ -190,8 +231,8 @@ fn way_at(marks: &[Mark], i: usize) -> Vector {
 }
 
 /// Whether something newer runs the same way beside a place.
-fn is_old(mark: &Mark, way: Vector, sided: bool, pieces: &[Piece]) -> bool {
-    pieces.iter().any(|p| {
+fn is_old(mark: &Mark, way: Vector, sided: bool, pieces: &Pieces) -> bool {
+    pieces.near(mark.at).any(|p| {
         if p.seen_ms < mark.seen_ms + NEWER_MS || p.sided != sided {
             return false;
         }
@@ -321,6 +362,56 @@ mod tests {
             "{}",
             alone.length_m()
         );
+    }
+
+    /// Pieces of any length, also far longer than others, anywhere.
+    #[test]
+    fn what_runs_beside_a_place_is_found_as_by_looking_at_all() {
+        let mut state = 7_u64;
+        let mut drawn = |most: f64| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            #[allow(clippy::cast_precision_loss, reason = "31 bits")]
+            let share = (state >> 33) as f64 / f64::from(1_u32 << 31);
+            share * most
+        };
+        let stretches: Vec<Stretch> = (0..60_u32)
+            .map(|k| {
+                let most_m = if k % 10 == 0 { 900.0 } else { 40.0 };
+                let (mut x, mut y) = (drawn(900.0), drawn(300.0));
+                let marks = (0..6).map(|i| {
+                    (x, y) = (
+                        x + drawn(most_m) - 0.5 * most_m,
+                        y + drawn(most_m) - 0.5 * most_m,
+                    );
+                    Mark {
+                        at: Point::new(x, y),
+                        seen_ms: u64::from(k) * 9_000,
+                        begins: i == 0,
+                    }
+                });
+                Stretch {
+                    marks: marks.collect(),
+                    sided: k % 2 == 0,
+                }
+            })
+            .collect();
+        let pieces = Pieces::of(&stretches);
+        let (mut beside, mut looked_at) = (0, 0);
+        for _ in 0..300 {
+            let at = Point::new(drawn(900.0), drawn(300.0));
+            let runs = |p: &&Piece| {
+                let grown_m = if p.sided { GROWN_MOST_M } else { 0.0 };
+                runs_beside(p, at, grown_m)
+            };
+            let near = pieces.near(at).filter(runs).count();
+            let all = pieces.by_west.iter().map(|(_, p)| p).filter(runs).count();
+            assert_eq!(near, all, "{at:?}");
+            beside += all;
+            looked_at += pieces.near(at).count();
+        }
+        assert!(beside > 1_000 && looked_at < 300 * pieces.by_west.len());
     }
 
     #[test]
