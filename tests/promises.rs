@@ -14,9 +14,15 @@
 use skein_peer::PeerId;
 use skein_peer::protocol::promises::{Promises, Statement};
 use stateright::{Checker, Model, Property};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::ops::Deref;
+use std::sync::Arc;
 
 /// A motion: whose it is, and which of its ways. Way 0 is in force at the beginning.
 type Way = (u16, u8);
+
+/// UAVs of the largest search.
+const UAVS_MOST: usize = 3;
 
 /// Statements of one author that can still arrive.
 const ON_AIR: usize = 3;
@@ -41,13 +47,52 @@ impl Case {
     }
 }
 
+/// A part of a state. A step changes one or two of them: the others are shared with the state
+/// before it, and their hashes are known.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Part<T> {
+    of: Arc<T>,
+    hash: u64,
+}
+
+impl<T: Clone + Hash> Part<T> {
+    fn new(of: T) -> Self {
+        let mut hasher = DefaultHasher::new();
+        of.hash(&mut hasher);
+        Self {
+            of: Arc::new(of),
+            hash: hasher.finish(),
+        }
+    }
+
+    fn change(&mut self, with: impl FnOnce(&mut T)) {
+        let mut of = T::clone(&self.of);
+        with(&mut of);
+        *self = Self::new(of);
+    }
+}
+
+impl<T> Deref for Part<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.of
+    }
+}
+
+impl<T> Hash for Part<T> {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        self.hash.hash(hasher);
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Sky {
-    uavs: Vec<Promises<Way>>,
-    made: Vec<u8>,
-    air: Vec<Vec<Statement<Way>>>,
+    uavs: Vec<Part<Promises<Way>>>,
+    made: [u8; UAVS_MOST],
+    air: Vec<Part<Vec<Statement<Way>>>>,
     /// The number of the newest statement that each heard of each.
-    heard: Vec<Vec<u32>>,
+    heard: [[u32; UAVS_MOST]; UAVS_MOST],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,21 +114,26 @@ impl Sky {
     /// What a UAV has to say goes on the air.
     fn say(&mut self, i: usize) {
         let said = self.uavs[i].statement();
-        let air = &mut self.air[i];
-        if air.last() != Some(&said) {
-            air.push(said);
-            if air.len() > ON_AIR {
-                air.remove(0);
-            }
+        if self.air[i].last() != Some(&said) {
+            self.air[i].change(|air| {
+                air.push(said);
+                if air.len() > ON_AIR {
+                    air.remove(0);
+                }
+            });
         }
     }
 
     /// Takes off the air what nobody would heed.
     fn clear_air(&mut self) {
         for (author, air) in self.air.iter_mut().enumerate() {
-            let others = self.heard.iter().enumerate().filter(|(i, _)| *i != author);
+            let others = self.heard.iter().take(self.uavs.len()).enumerate();
+            let others = others.filter(|(i, _)| *i != author);
             let least = others.map(|(_, of)| of[author]).min();
-            air.retain(|said| least.is_none_or(|least| said.number > least));
+            let is_news = |said: &Statement<Way>| least.is_none_or(|least| said.number > least);
+            if !air.iter().all(is_news) {
+                air.change(|air| air.retain(is_news));
+            }
         }
     }
 }
@@ -101,11 +151,15 @@ impl Model for Case {
                 let _ = u.hear(id(j), s);
             }
         }
+        let mut heard = [0; UAVS_MOST];
+        for (of, said) in heard.iter_mut().zip(&said) {
+            *of = said.number;
+        }
         vec![Sky {
-            made: vec![0; uavs.len()],
-            air: vec![Vec::new(); uavs.len()],
-            heard: vec![said.iter().map(|s| s.number).collect(); uavs.len()],
-            uavs,
+            made: [0; UAVS_MOST],
+            air: vec![Part::new(Vec::new()); uavs.len()],
+            heard: [heard; UAVS_MOST],
+            uavs: uavs.into_iter().map(Part::new).collect(),
         }]
     }
 
@@ -121,34 +175,39 @@ impl Model for Case {
             }
             for (author, air) in sky.air.iter().enumerate().filter(|(a, _)| *a != i) {
                 let to = i;
-                actions.extend((0..air.len()).map(|nth| Action::Deliver { author, nth, to }));
+                // What is not newer than what was heard changes nothing.
+                let news = (0..air.len()).filter(|nth| air[*nth].number > sky.heard[i][author]);
+                actions.extend(news.map(|nth| Action::Deliver { author, nth, to }));
             }
         }
     }
 
     fn next_state(&self, sky: &Sky, action: Action) -> Option<Sky> {
         let apart = |a: &Way, b: &Way| self.apart(a, b);
-        let mut next = sky.clone();
         let who = match action {
-            Action::Propose(i, way) => {
-                next.uavs[i].propose((id(i).0, way));
-                next.made[i] += 1;
-                i
-            }
-            Action::Withdraw(i) => {
-                let _ = next.uavs[i].withdraw();
-                i
-            }
-            Action::Deliver { author, nth, to } => {
-                let said = &sky.air[author][nth];
-                if !next.uavs[to].hear(id(author), said) {
-                    return None;
-                }
-                next.heard[to][author] = said.number;
-                to
-            }
+            Action::Propose(i, _) | Action::Withdraw(i) | Action::Deliver { to: i, .. } => i,
         };
-        let _ = next.uavs[who].settle(true, &|_| true, &apart);
+        let mut next = sky.clone();
+        match action {
+            Action::Propose(i, _) => next.made[i] += 1,
+            Action::Deliver { author, nth, to } => {
+                next.heard[to][author] = sky.air[author][nth].number;
+            }
+            Action::Withdraw(_) => {}
+        }
+        next.uavs[who].change(|u| {
+            match action {
+                Action::Propose(i, way) => u.propose((id(i).0, way)),
+                Action::Withdraw(_) => {
+                    let _ = u.withdraw();
+                }
+                Action::Deliver { author, nth, .. } => {
+                    let is_newer = u.hear(id(author), &sky.air[author][nth]);
+                    assert!(is_newer, "what is not newer is not delivered");
+                }
+            }
+            let _ = u.settle(true, &|_| true, &apart);
+        });
         next.say(who);
         next.clear_air();
         Some(next)
@@ -157,7 +216,7 @@ impl Model for Case {
     fn properties(&self) -> Vec<Property<Self>> {
         vec![
             Property::always("motions in force keep apart", |case: &Case, sky: &Sky| {
-                let flown: Vec<&Way> = sky.uavs.iter().map(Promises::in_force).collect();
+                let flown: Vec<&Way> = sky.uavs.iter().map(|u| u.in_force()).collect();
                 flown.iter().all(|a| flown.iter().all(|b| case.apart(a, b)))
             }),
             Property::sometimes("somebody gets through", |case: &Case, sky: &Sky| {
