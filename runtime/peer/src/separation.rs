@@ -58,8 +58,9 @@ const STANDING_AGAIN_MS: u64 = 400;
 /// sooner.
 const NOTHING_TO_DO_MS: u64 = 10_000;
 
-/// What waits for an answer is said again after so long, milliseconds.
-const SAY_AGAIN_MS: u64 = 900;
+/// What waits for an answer is said again after so long, milliseconds: what was lost, or its
+/// answer, comes again before even what is offered soonest would turn off.
+const SAY_AGAIN_MS: u64 = 600;
 
 /// What asks for nothing is said again with its motions after so long, milliseconds: who
 /// comes into earshot learns of it before the two can meet.

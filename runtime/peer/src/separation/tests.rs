@@ -104,3 +104,24 @@ fn who_asks_to_take_off_is_told_all_that_is_flown_there() {
         Some(false)
     );
 }
+
+/// The shortest lead leaves time for one repetition and its answer.
+#[test]
+fn what_is_not_answered_is_said_again_before_it_would_turn_off() {
+    let mut separation = flies(straight_on(9_000));
+    let far = MotionPlan {
+        north_mm: 900_000,
+        ..straight_on(10_600)
+    };
+    let Some(known) = &mut separation.conflicts else {
+        panic!("it flies");
+    };
+    let turns_off_ms = 10_600 + known.clone().answered_soon().lead_ms();
+    assert_eq!(known.offer(10_600, [(&far, turns_off_ms)], None), Some(0));
+    let percepts = (10_600..turns_off_ms).step_by(200);
+    let said: Vec<u64> = percepts
+        .filter(|now_ms| !separation.speak(*now_ms).is_empty())
+        .collect();
+    assert_eq!(said, [10_600, 11_200]);
+    assert!(turns_off_ms >= said[1] + 400, "two percepts for the answer");
+}
