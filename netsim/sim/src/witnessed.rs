@@ -206,6 +206,7 @@ impl Witnessed {
                 picture: m.picture,
                 is_late: false,
                 sees: &|at: Point| world.is_open_from(m.eye, at),
+                displaced_m: world.vehicles().displaced_m(uav),
                 counted: &said.counted,
             };
             let found = &mut self.found;

@@ -41,6 +41,10 @@ const OFF_BEGUN: f64 = 1.2;
 /// Near an outline is who is no farther from it, metres.
 const NEAR_M: f64 = 6.0;
 
+/// A UAV is farther off than it takes itself to be in one case of ninety, metres: three standard
+/// deviations. Whoever stands near the outline may be on the other side of it for such a one.
+const DISPLACED_M: f64 = 6.0;
+
 /// Who stands is off by no more than this, and this share of who stands.
 const OCCUPANCY_OFF: f64 = 1.5;
 const OCCUPANCY_OFF_SHARE: f64 = 0.1;
@@ -184,6 +188,30 @@ impl Site {
     fn contains(&self, p: Point) -> bool {
         (p - self.middle).norm() <= self.radius_m && self.outline.contains(p)
     }
+
+    /// Who stands there, as a UAV may see it that takes itself to be so far off, metres: who is
+    /// that near to the outline may be on the other side of it for one that is off by more than
+    /// usual.
+    fn stood(&self, places: &[Point], speeds: &[f64], displaced_m: f64) -> Stood {
+        let off_m = if displaced_m > DISPLACED_M {
+            displaced_m
+        } else {
+            0.0
+        };
+        let mut stood = Stood::default();
+        for (at, mps) in places.iter().zip(speeds) {
+            let may_be = (*at - self.middle).norm() <= self.radius_m + off_m;
+            if *mps >= MAY_STAND_MPS || !may_be {
+                continue;
+            }
+            let (is_in, stands) = (self.contains(*at), *mps < STANDS_MPS);
+            let is_near = off_m > 0.0 && self.outline.outline_distance_m(*at) <= off_m;
+            stood.there += u16::from(is_in && stands);
+            stood.least += u16::from(is_in && stands && !is_near);
+            stood.most += u16::from(is_in || is_near);
+        }
+        stood
+    }
 }
 
 /// Vehicles beside the sites, from one look to the next.
@@ -298,8 +326,19 @@ pub struct CountLook<'a> {
     pub is_late: bool,
     /// Whether nothing stands between its camera and a place.
     pub sees: &'a dyn Fn(Point) -> bool,
+    /// How far off it takes itself to be, metres.
+    pub displaced_m: f64,
     /// Site by site whether it says that it counts, and what it counted.
     pub counted: &'a [(bool, Count)],
+}
+
+/// Who stood at a site when one looked at it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Stood {
+    there: u16,
+    /// Who was there for whoever looked, at least and at most.
+    least: u16,
+    most: u16,
 }
 
 /// The counts of one run.
@@ -317,8 +356,8 @@ pub struct CountCheck {
     watchers: BTreeMap<u16, Watcher>,
     /// What was counted in lives that are over, and what truly drove meanwhile.
     former: Vec<(u32, u64, Driven)>,
-    /// Who stood at a site when one looked at it, and who may have.
-    stood: BTreeMap<(usize, u16, u64), (u16, u16)>,
+    /// Who stood at a site when one looked at it.
+    stood: BTreeMap<(usize, u16, u64), Stood>,
     /// How fast each vehicle is, m/s, and from when and where on that is measured.
     speeds: Vec<f64>,
     paced: (u64, Vec<Point>),
@@ -401,8 +440,7 @@ impl CountCheck {
                 watch.truth.take(&steps, i, apart_ms);
             }
             if own.seen_ms > watch.own.seen_ms {
-                let slower = |than_mps| stand(site, truth, &self.speeds, than_mps);
-                let stood = (slower(STANDS_MPS), slower(MAY_STAND_MPS));
+                let stood = site.stood(truth, &self.speeds, look.displaced_m);
                 self.stood.insert((i, look.uav, own.seen_ms), stood);
             }
             let was = watch.counts;
@@ -581,8 +619,8 @@ impl CountCheck {
                 pictured_ms: self.pictured[i].1,
                 stood_then: seen
                     .and_then(|s| self.stood.get(&(i, s.by, s.seen_ms)))
-                    .map(|(stood, _)| *stood),
-                stands: stand(s, &self.all.places, &self.speeds, STANDS_MPS),
+                    .map(|stood| stood.there),
+                stands: s.stood(&self.all.places, &self.speeds, 0.0).there,
             }
         };
         self.sites.iter().enumerate().map(one).collect()
@@ -625,26 +663,20 @@ fn check_count(site: &Site, watch: &mut Watch, at: (u64, u16), found: &mut Findi
     }
 }
 
-/// How many vehicles at a site are slower than so.
-fn stand(site: &Site, places: &[Point], speeds: &[f64], than_mps: f64) -> u16 {
-    let all = speeds.iter().zip(places);
-    let slow = all.filter(|(mps, at)| **mps < than_mps && site.contains(**at));
-    u16::try_from(slow.count()).unwrap_or(u16::MAX)
-}
-
 fn check_occupancy(
     site: &Site,
     watch: &mut Watch,
-    stood: Option<&(u16, u16)>,
+    stood: Option<&Stood>,
     at: (u64, u16),
     found: &mut Findings,
 ) {
-    let Some((is, may_be)) = stood.map(|(n, more)| (f64::from(*n), f64::from(*more))) else {
+    let Some(stood) = stood else {
         return;
     };
+    let [is, least, most] = [stood.there, stood.least, stood.most].map(f64::from);
     let says = f64::from(watch.own.standing);
     let slack = OCCUPANCY_OFF + OCCUPANCY_OFF_SHARE * is;
-    let off = says < is - slack || says > may_be + slack;
+    let off = says < least - slack || says > most + slack;
     if off && site.site.what == Counted::Standing && !core::mem::replace(&mut watch.told, true) {
         found.broken("occupancy", at.0, Some(at.1), || {
             format!(

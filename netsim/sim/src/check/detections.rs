@@ -50,7 +50,8 @@ const NEAR_M: f64 = 45.0;
 /// six of them, one of 60 million is.
 const NEVER: f64 = 1.5;
 
-/// So many of one run may be between the two.
+/// What so many UAVs of one run tell may be between the two. Most of the error is how far off a UAV
+/// takes itself to be, which is the same for all that it tells.
 const FAR_MAX: usize = 1;
 
 /// A vehicle as it is.
@@ -160,8 +161,8 @@ pub struct DetectionCheck {
     told: BTreeMap<(u16, u16, u64), Told>,
     /// Which vehicles were told in this sortie.
     known: BTreeSet<usize>,
-    /// How many were farther from where they were told to be than the error that was told.
-    n_far: usize,
+    /// Who told of what was farther from there than the error that was told.
+    far: BTreeSet<u16>,
     pictured: BTreeMap<(u16, usize), Pictured>,
     first_ms: BTreeMap<usize, u64>,
     twice: Clocks<(u16, u16, usize)>,
@@ -267,8 +268,8 @@ impl DetectionCheck {
         let more_m = 40.0 * seconds(late_ms.saturating_sub(LATE_MS));
         let there = nearest.filter(|(_, off_m)| *off_m <= NEVER * error_m + more_m);
         let is_far = there.is_some_and(|(_, off_m)| off_m > error_m + more_m);
-        self.n_far += usize::from(is_far);
-        if there.is_none() || is_far && self.n_far > FAR_MAX {
+        self.far.extend(is_far.then_some(by));
+        if there.is_none() || is_far && self.far.len() > FAR_MAX {
             let words = told.sentence(id.author);
             found.broken("detect-false", now_ms, Some(by), || match nearest {
                 Some((n, off_m)) => {

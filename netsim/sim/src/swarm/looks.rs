@@ -121,6 +121,7 @@ impl Swarm {
             picture: body.picture(),
             is_late: peer.slow_ms > 0,
             sees: &|at: Point| world.is_open_to(id, at),
+            displaced_m: self.air.vehicles().displaced_m(id),
             counted: &counted,
         };
         let truth: Vec<Point> = self.air.vehicles().places().collect();

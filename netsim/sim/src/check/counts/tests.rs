@@ -64,6 +64,7 @@ impl Scene {
                 uav: 1,
                 picture: Picture::level(Pose::new(at, 0.0), (40.0, 30.0)),
                 sees: &|_| self.is_open,
+                displaced_m: 0.0,
                 counted: &counted,
             };
             let now_ms = (s * 1000.0).round() as u64;
@@ -213,4 +214,29 @@ fn who_stands_is_compared_once_the_look_is_over() {
         let report = &scene.check.reports(12_000, &[])[0];
         assert_eq!(report.stands, 1);
     }
+}
+
+/// `parking` 922012: a UAV that took itself to be ten metres off counted 13 of 17, of whom most stood
+/// at the outline.
+#[test]
+fn who_stands_at_the_outline_may_be_on_either_side_of_it_for_one_who_errs_by_much() {
+    let scene = Scene::new(Counted::Standing);
+    let site = &scene.check.sites[0];
+    let out_m = site.radius_m;
+    // In the middle, near the outline outside of it, and far away; the last one drives through.
+    let places = [0.0, out_m + 1.0, 10.0 * out_m, 0.0].map(|x| Point::new(x, 0.0));
+    let speeds = [0.0, 0.0, 0.0, 5.0];
+    let stood = |displaced_m| {
+        let s = site.stood(&places, &speeds, displaced_m);
+        (s.there, s.least, s.most)
+    };
+    assert_eq!(stood(0.0), (1, 1, 1));
+    assert_eq!(stood(DISPLACED_M), (1, 1, 1), "no more than usual");
+    assert_eq!(stood(out_m), (1, 0, 2));
+    let slow = site.stood(&places, &[1.0; 4], 0.0);
+    assert_eq!(
+        (slow.there, slow.least, slow.most),
+        (0, 0, 2),
+        "it may stand"
+    );
 }

@@ -294,3 +294,18 @@ fn what_came_of_each_is_told() {
         story.found.violations
     );
 }
+
+/// `lookout` 922012: a UAV that took itself to be ten metres off told two cars that far off.
+#[test]
+fn what_a_uav_that_errs_by_more_than_it_tells_says_of_several_is_one_error() {
+    let broke = |by: [u16; 2], off_m: f64| {
+        let mut story = Story::new(cars());
+        for (s, uav) in [10, 20].into_iter().zip(by) {
+            story.tell(s, uav, &told(s * 1000, off_m), &[car(0.0)]);
+        }
+        story.broke("detect-false")
+    };
+    assert!(!broke([1, 2], 7.9));
+    assert!(!broke([1, 1], 10.0) && broke([1, 2], 10.0));
+    assert!(broke([1, 1], 12.1), "no error is so large");
+}
