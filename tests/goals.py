@@ -155,11 +155,10 @@ def tracking(goals):
         goals.bench(f"two UAVs, one target {' '.join(options)}".strip(),
                     ["tracking", "--uavs", "2", *options, "--json", "--seeds", goals.seeds(16)],
                     quiet)
+    # Seldom is one lost, and then for long: it takes hundreds of runs to say how often.
     goals.bench("two UAVs, one target that evades at 23 m/s",
                 ["tracking", "--uavs", "2", "--target-mps", "18", "--json", "--seeds",
-                 goals.seeds(16)], ["in_footprint_share >= 0.99", "chatter <= 0"],
-                "who evades at nine tenths of the top speed of a UAV, and turns off every eighty "
-                "metres, is lost now and then")
+                 goals.seeds(400)], ["in_footprint_share >= 0.99", "chatter <= 0"])
     goals.bench("five UAVs, two targets, with noise",
                 ["tracking", "--uavs", "5", "--targets", "2", "--noise", "--json", "--seeds",
                  goals.seeds(12)], ["reacquired_within_10s >= 0.95", "nees <= 6"])
