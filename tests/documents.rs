@@ -271,3 +271,30 @@ fn decisions_have_one_form_and_are_listed() {
     }
     assert!(listed >= 24, "only {listed} decisions");
 }
+
+/// The lines that a patch expects to find one after the other, and the file that it names.
+fn expected(patch: &str) -> (&str, String) {
+    let file = patch.lines().find_map(|l| l.strip_prefix("+++ b/"));
+    let hunk = patch.lines().skip_while(|l| !l.starts_with("@@")).skip(1);
+    let kept = hunk.filter(|l| !l.starts_with('+'));
+    let before = kept.map(|l| format!("{}\n", l.get(1..).unwrap_or_default()));
+    (file.unwrap(), before.collect())
+}
+
+#[test]
+fn mistakes_apply_to_the_code_as_it_is() {
+    let all = files(&["tests/mutants"], "patch");
+    assert!(!all.is_empty());
+    for path in all {
+        let patch = std::fs::read_to_string(&path).unwrap();
+        let (file, before) = expected(&patch);
+        assert_eq!(patch.matches("\n@@").count(), 1, "{}", path.display());
+        let code = std::fs::read_to_string(root().join(file)).unwrap();
+        assert_eq!(
+            code.matches(&before).count(),
+            1,
+            "{} in {file}",
+            path.display()
+        );
+    }
+}
