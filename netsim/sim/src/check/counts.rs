@@ -206,9 +206,13 @@ impl Site {
             }
             let (is_in, stands) = (self.contains(*at), *mps < STANDS_MPS);
             let is_near = off_m > 0.0 && self.outline.outline_distance_m(*at) <= off_m;
-            stood.there += u16::from(is_in && stands);
-            stood.least += u16::from(is_in && stands && !is_near);
-            stood.most += u16::from(is_in || is_near);
+            for (count, counts) in [
+                (&mut stood.there, is_in && stands),
+                (&mut stood.least, is_in && stands && !is_near),
+                (&mut stood.most, is_in || is_near),
+            ] {
+                *count = count.saturating_add(u16::from(counts));
+            }
         }
         stood
     }

@@ -316,6 +316,7 @@ fn strung(runs: Vec<(Vec<Mark>, bool)>) -> Outline {
 mod tests {
     use super::*;
     use skein_geometry::math::{TAU, cos, sin};
+    use skein_geometry::random::SplitMix64;
 
     /// A part of a circle that grows, as it is flown along, from and to turns.
     fn arc(from: f64, to: f64, begun_ms: u64) -> Stretch {
@@ -367,15 +368,8 @@ mod tests {
     /// Pieces of any length, also far longer than others, anywhere.
     #[test]
     fn what_runs_beside_a_place_is_found_as_by_looking_at_all() {
-        let mut state = 7_u64;
-        let mut drawn = |most: f64| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            #[allow(clippy::cast_precision_loss, reason = "31 bits")]
-            let share = (state >> 33) as f64 / f64::from(1_u32 << 31);
-            share * most
-        };
+        let mut random = SplitMix64::new(7);
+        let mut drawn = |most: f64| random.unit() * most;
         let stretches: Vec<Stretch> = (0..60_u32)
             .map(|k| {
                 let most_m = if k % 10 == 0 { 900.0 } else { 40.0 };
