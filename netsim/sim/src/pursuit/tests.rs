@@ -120,7 +120,7 @@ fn who_searches_finds_without_a_map_too() {
         };
         let s = Settings {
             noise: Some(Noise::usual()),
-            target_mps: 18.0,
+            target_mps: 20.0,
             uavs: 1,
             knows,
             ..settings()
@@ -128,7 +128,7 @@ fn who_searches_finds_without_a_map_too() {
         fly(&s, 60..66).in_footprint_share_all.unwrap()
     };
     let (glances, searches) = (seen(false), seen(true));
-    assert!(searches > glances, "{glances} {searches}");
+    assert!(searches > glances + 0.02, "{glances} {searches}");
 }
 
 #[test]

@@ -458,11 +458,11 @@ impl Follower {
         let fast = at(speeds.most_mps);
         let off_rad = wrap_pi(fast.nose.heading_rad - scene.pose.heading_rad);
         let turns = off_rad.abs() > TURNS_RAD;
-        // A slow wing turns faster: it comes round sooner, and loses less way.
-        let slow_mps = speeds.of_weave_mps(scene.drift.velocity_mps.norm());
+        // The slowest wing turns fastest: it comes round soonest, and loses the least way. As fast
+        // as its target it would turn half as fast, and see it leave the picture meanwhile.
         let wanted = if turns {
             Wanted {
-                airspeed_mps: slow_mps,
+                airspeed_mps: speeds.least_mps,
                 ..fast
             }
         } else {

@@ -215,6 +215,37 @@ fn who_is_outrun_says_so_and_catches_up_when_the_target_stops() {
     assert!(outrun && (last_m - 100.0).abs() < 1.0, "{outrun} {last_m}");
 }
 
+/// A car that stood speeds away from a UAV that flies the other way: it turns round slowly, for
+/// then it turns fast, and the car is in its picture all the time (219 m on the ground).
+#[test]
+fn who_is_left_behind_turns_round_before_it_hurries() {
+    let away = |t: f64| {
+        let v = (2.0 * t).min(23.4);
+        let moved = if t < 11.7 {
+            t * t
+        } else {
+            11.7 * 11.7 + 23.4 * (t - 11.7)
+        };
+        TargetMotion {
+            position: Point::new(-moved, 0.0),
+            velocity_mps: Vector::new(-v, 0.0),
+            acceleration_mps2: Vector::new(if t < 11.7 { -2.0 } else { 0.0 }, 0.0),
+        }
+    };
+    let s = settings(Field::HOPF, StandOff::Distance(150.0));
+    let mut farthest_m = 0.0_f64;
+    for nth in 0..24 {
+        let bearing_rad = f64::from(nth) * TAU / 24.0;
+        let (sin, cos) = sin_cos(bearing_rad);
+        let on_circle = Point::new(150.0 * cos, 150.0 * sin);
+        let begin = Pose::new(on_circle, wrap_pi(bearing_rad + TAU / 4.0));
+        flight(s, Wind::CALM, begin, 120.0, &away, &mut |t, p, _| {
+            farthest_m = farthest_m.max((p.position() - away(t).position).norm());
+        });
+    }
+    assert!(farthest_m < 219.0, "{farthest_m} m");
+}
+
 #[test]
 fn beside_a_target_at_a_bearing() {
     // 15 m/s is an airspeed: the UAV stands 80 m to its left.
