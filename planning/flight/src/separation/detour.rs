@@ -9,8 +9,9 @@
 //! Equal inputs give equal lists. Turns keep the bank limit at their airspeed.
 //!
 //! # Complexity
-//! O(offsets · places · airspeeds · circles): some sixteen hundred candidates, made and
-//! sorted at each search.
+//! O(offsets · places · airspeeds) courses, some five hundred; with the circles before them that
+//! makes some sixteen hundred ways, priced and sorted at each search, and made as they are asked
+//! for.
 
 use super::motion::{Stretch, radius_mm, to_mm};
 use crate::airframe::{Airframe, GRAVITY_MPS2, PowerModel};
@@ -65,9 +66,13 @@ impl Detours {
     /// The direct way at cruise; `None` only where a goal is nearer than any turn.
     #[must_use]
     pub fn direct(&self, from: Pose, goal: Point) -> Option<Detour> {
-        let mps = self.airframe.cruise_mps;
-        let way = towards(from, goal, self.airframe.ground_turn_radius_m(mps, 0.0))?;
-        Some(self.priced(&way, mps, 0.0))
+        let price = Price::at(&self.airframe, self.airframe.cruise_mps);
+        let way = Candidate {
+            circles: 0,
+            price,
+            pieces: towards(from, goal, price.radius_m)?,
+        };
+        Some(way.made(way.cost_s(0.0)))
     }
 
     /// No way to a goal costs less than this, seconds: straight there at cruise.
@@ -76,42 +81,44 @@ impl Detours {
         (goal - from.position()).norm() / self.airframe.cruise_mps
     }
 
-    /// All ways from a pose to a goal, cheapest first.
-    #[must_use]
-    pub fn all(&self, from: Pose, goal: Point) -> Vec<Detour> {
-        let mut ways: Vec<Detour> = Vec::new();
+    /// The ways from a pose to a goal that cost at most so much, seconds, cheapest first; each is
+    /// made when it is asked for.
+    pub fn ways(&self, from: Pose, goal: Point, most_s: f64) -> impl Iterator<Item = Detour> {
+        let mut found: Vec<Candidate> = Vec::new();
+        let mut order: Vec<(f64, usize)> = Vec::new();
         for share in AIRSPEEDS {
             let mps = (share * self.airframe.cruise_mps)
                 .clamp(self.airframe.least_airspeed_mps(), self.airframe.max_mps);
-            let radius_m = self.airframe.ground_turn_radius_m(mps, 0.0);
+            let price = Price::at(&self.airframe, mps);
+            let courses = self.courses(from, goal, price.radius_m);
             for circles in 0..=CIRCLES {
-                self.at_airspeed(from, goal, (mps, radius_m, circles), &mut ways);
+                for (pieces, extra_s) in &courses {
+                    let way = Candidate {
+                        circles,
+                        price,
+                        pieces: *pieces,
+                    };
+                    let cost_s = way.cost_s(*extra_s);
+                    if cost_s <= most_s {
+                        order.push((cost_s, found.len()));
+                        found.push(way);
+                    }
+                }
             }
         }
-        ways.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s));
-        ways
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let made = move |(cost_s, nth): (f64, usize)| Some(found.get(nth)?.made(cost_s));
+        order.into_iter().filter_map(made)
     }
 
-    fn at_airspeed(
-        &self,
-        from: Pose,
-        goal: Point,
-        (mps, radius_m, circles): (f64, f64, u32),
-        ways: &mut Vec<Detour>,
-    ) {
-        let wait = waiting(from, radius_m, circles);
-        let mut add = |curve: Option<Curve>, extra_s: f64| {
-            if let Some(c) = curve {
-                let mut all = wait.clone();
-                all.extend(&c);
-                ways.push(self.priced(&all, mps, extra_s));
-            }
-        };
-        add(towards(from, goal, radius_m), 0.0);
+    /// All courses to a goal at one airspeed, and what each costs on top, seconds.
+    fn courses(&self, from: Pose, goal: Point, radius_m: f64) -> Vec<(Pieces, f64)> {
+        let direct = towards(from, goal, radius_m).map(|way| (way, 0.0));
+        let mut courses: Vec<(Pieces, f64)> = direct.into_iter().collect();
         let straight = goal - from.position();
         let length_m = straight.norm();
         if length_m < f64::EPSILON {
-            return;
+            return courses;
         }
         let right = Vector::new(straight.y, -straight.x) / length_m;
         for place in PLACES {
@@ -119,66 +126,156 @@ impl Detours {
                 for (side, extra_s) in [(1.0, 0.0), (-1.0, LEFT_S)] {
                     let beside = right * (side * offset * self.separation_m);
                     let via = from.position() + straight * place + beside;
-                    add(through(from, via, goal, radius_m), extra_s);
+                    courses.extend(through(from, via, goal, radius_m).map(|way| (way, extra_s)));
                 }
             }
         }
+        courses
+    }
+}
+
+/// Turns and lines of a course, two each at most.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pieces {
+    /// Curvatures, 1/m, and lengths, metres.
+    all: [(f64, f64); 4],
+    count: usize,
+}
+
+impl Pieces {
+    /// Appends a piece that is longer than a tenth of a millimetre, if there is room.
+    fn push(&mut self, piece: (f64, f64)) {
+        if let Some(free) = self.all.get_mut(self.count).filter(|_| piece.1 > 1e-4) {
+            *free = piece;
+            self.count += 1;
+        }
     }
 
-    fn priced(&self, curve: &Curve, mps: f64, extra_s: f64) -> Detour {
-        let duration_s = curve.length_m() / mps;
-        let power = PowerModel::of(&self.airframe);
-        let energy_s: f64 = curve
-            .segments()
-            .iter()
-            .map(|s| {
-                let rate = s.curvature_per_m.abs() * mps;
-                let bank = atan2(rate * mps, GRAVITY_MPS2);
-                power.share(mps, bank) * s.length_m / mps
-            })
-            .sum();
-        let at_cruise_s = curve.length_m() / self.airframe.cruise_mps;
-        let hurry_s = (duration_s - at_cruise_s).abs();
-        let burnt_s = (energy_s - at_cruise_s).max(0.0);
-        Detour {
-            stretches: stretches(curve, mps),
-            duration_s,
-            cost_s: at_cruise_s + hurry_s + burnt_s + extra_s,
+    fn iter(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.all.iter().take(self.count).copied()
+    }
+
+    fn length_m(&self) -> f64 {
+        self.iter().map(|(_, length_m)| length_m).sum()
+    }
+
+    /// Where it ends that begins at a pose; nothing where there is nothing to fly.
+    fn end(&self, from: Pose) -> Option<Pose> {
+        let after = |start, (curvature_per_m, length_m)| {
+            let piece = Segment {
+                start,
+                curvature_per_m,
+                length_m,
+            };
+            piece.end()
+        };
+        (self.count > 0).then(|| self.iter().fold(from, after))
+    }
+}
+
+/// What flying at one airspeed comes to.
+#[derive(Clone, Copy, Debug)]
+struct Price {
+    mps: f64,
+    cruise_mps: f64,
+    /// Of its turns.
+    radius_m: f64,
+    /// Power on a line and in a turn, of that at cruise.
+    line: f64,
+    turn: f64,
+}
+
+impl Price {
+    fn at(airframe: &Airframe, mps: f64) -> Self {
+        let radius_m = airframe.ground_turn_radius_m(mps, 0.0);
+        let power = PowerModel::of(airframe);
+        let share = |curvature_per_m: f64| {
+            let rate = curvature_per_m * mps;
+            power.share(mps, atan2(rate * mps, GRAVITY_MPS2))
+        };
+        Self {
+            mps,
+            cruise_mps: airframe.cruise_mps,
+            radius_m,
+            line: share(0.0),
+            turn: share(1.0 / radius_m),
         }
     }
 }
 
-/// Circles to the right at a pose.
-fn waiting(from: Pose, radius_m: f64, circles: u32) -> Curve {
-    let mut wait = Curve::empty();
-    for _ in 0..circles {
-        wait.push(Segment {
-            start: from,
-            curvature_per_m: -1.0 / radius_m,
-            length_m: TAU * radius_m,
-        });
+/// A way that was not made yet.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    /// Circles to the right that are waited first.
+    circles: u32,
+    price: Price,
+    pieces: Pieces,
+}
+
+impl Candidate {
+    /// All that is flown, as curvatures, 1/m, and lengths, metres.
+    fn flown(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let radius_m = self.price.radius_m;
+        let circle = (-1.0 / radius_m, TAU * radius_m);
+        (0..self.circles)
+            .map(move |_| circle)
+            .chain(self.pieces.iter())
     }
-    wait
+
+    fn length_m(&self) -> f64 {
+        self.flown().map(|(_, length_m)| length_m).sum()
+    }
+
+    fn cost_s(&self, extra_s: f64) -> f64 {
+        let Price {
+            mps,
+            cruise_mps,
+            line,
+            turn,
+            ..
+        } = self.price;
+        let energy_s: f64 = self
+            .flown()
+            .map(|(bend, length_m)| if bend == 0.0 { line } else { turn } * length_m / mps)
+            .sum();
+        let length_m = self.length_m();
+        let at_cruise_s = length_m / cruise_mps;
+        let hurry_s = (length_m / mps - at_cruise_s).abs();
+        let burnt_s = (energy_s - at_cruise_s).max(0.0);
+        at_cruise_s + hurry_s + burnt_s + extra_s
+    }
+
+    fn made(&self, cost_s: f64) -> Detour {
+        Detour {
+            stretches: flown_at(self.flown(), self.price.mps),
+            duration_s: self.length_m() / self.price.mps,
+            cost_s,
+        }
+    }
 }
 
 /// The stretches of a curve at one airspeed.
 #[must_use]
 pub fn stretches(curve: &Curve, airspeed_mps: f64) -> Vec<Stretch> {
-    curve
-        .segments()
-        .iter()
-        .map(|s| Stretch {
-            radius_mm: radius_mm(s.curvature_per_m),
-            length_mm: to_mm(s.length_m),
-            airspeed_mmps: to_mm(airspeed_mps),
-        })
-        .filter(|s| s.length_mm > 0)
-        .collect()
+    let pieces = curve.segments().iter();
+    flown_at(
+        pieces.map(|s| (s.curvature_per_m, s.length_m)),
+        airspeed_mps,
+    )
+}
+
+fn flown_at(pieces: impl Iterator<Item = (f64, f64)>, airspeed_mps: f64) -> Vec<Stretch> {
+    let stretch = |(curvature_per_m, length_m)| Stretch {
+        radius_mm: radius_mm(curvature_per_m),
+        length_mm: to_mm(length_m),
+        airspeed_mmps: to_mm(airspeed_mps),
+    };
+    pieces.map(stretch).filter(|s| s.length_mm > 0).collect()
 }
 
 /// A turn and a line to a place, whatever the heading there; `None` if the place lies within
 /// both turns.
-fn towards(from: Pose, to: Point, radius_m: f64) -> Option<Curve> {
+fn towards(from: Pose, to: Point, radius_m: f64) -> Option<Pieces> {
     let left = turn_and_line(from, to, radius_m);
     let right = turn_and_line(from, to, -radius_m);
     match (left, right) {
@@ -188,7 +285,7 @@ fn towards(from: Pose, to: Point, radius_m: f64) -> Option<Curve> {
 }
 
 /// The same with the turn to one side: the radius is positive to the left.
-fn turn_and_line(from: Pose, to: Point, radius_m: f64) -> Option<Curve> {
+fn turn_and_line(from: Pose, to: Point, radius_m: f64) -> Option<Pieces> {
     let (side, r) = (radius_m.signum(), radius_m.abs());
     let d = from.direction();
     let centre = from.position() + Vector::new(-d.y, d.x) * radius_m;
@@ -203,16 +300,18 @@ fn turn_and_line(from: Pose, to: Point, radius_m: f64) -> Option<Curve> {
     if turned_rad > TAU - NO_TURN_RAD {
         turned_rad = 0.0;
     }
-    Some(Curve::from_pieces(
-        from,
-        &[(side / r, turned_rad * r), (0.0, line_m)],
-    ))
+    let mut way = Pieces::default();
+    way.push((side / r, turned_rad * r));
+    way.push((0.0, line_m));
+    Some(way)
 }
 
-fn through(from: Pose, via: Point, goal: Point, radius_m: f64) -> Option<Curve> {
+fn through(from: Pose, via: Point, goal: Point, radius_m: f64) -> Option<Pieces> {
     let mut way = towards(from, via, radius_m)?;
-    let there = way.end()?;
-    way.extend(&towards(there, goal, radius_m)?);
+    let there = way.end(from)?;
+    for piece in towards(there, goal, radius_m)?.iter() {
+        way.push(piece);
+    }
     Some(way)
 }
 
@@ -245,7 +344,7 @@ mod tests {
         let from = Pose::new(Point::new(-600.0, 3.0), 0.1);
         let goal = Point::new(600.0, 0.0);
         let direct = makes.direct(from, goal).unwrap();
-        let ways = makes.all(from, goal);
+        let ways: Vec<Detour> = makes.ways(from, goal, f64::INFINITY).collect();
         assert!(ways.len() > 1_000, "{}", ways.len());
         assert!(ways[0].cost_s > direct.cost_s - 0.05, "{:?}", ways[0]);
         for w in &ways {

@@ -24,7 +24,7 @@ use crate::PeerId;
 use crate::wire::limits::ACCEPTS_MAX;
 use serde::{Deserialize, Serialize};
 use skein_flight::separation::{Detour, Detours, End, Motion, MotionPlan, first_loss_s};
-use skein_geometry::frame::{Point, Pose};
+use skein_geometry::frame::Point;
 use skein_geometry::math::seconds;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -610,19 +610,12 @@ impl Conflicts {
             let motion = Motion::new(plan).ok()?;
             self.promises.is_clear(&motion, &apart).then_some(motion)
         };
-        let ways = self.ways(from, wish.goal, most_s);
-        ways.iter().find_map(clear)
-    }
-
-    /// Ways that cost at most so much, seconds, cheapest first.
-    fn ways(&self, from: Pose, goal: Point, most_s: f64) -> Vec<Detour> {
         let detours = self.apart.detours;
-        if detours.least_cost_s(from, goal) > most_s {
-            return Vec::new();
+        if detours.least_cost_s(from, wish.goal) > most_s {
+            return None;
         }
-        let mut ways = detours.all(from, goal);
-        ways.retain(|way| way.cost_s <= most_s);
-        ways
+        let mut ways = detours.ways(from, wish.goal, most_s);
+        ways.find_map(|way| clear(&way))
     }
 }
 
