@@ -327,10 +327,11 @@ impl Gathering {
                 due = Some((news, since_ms, tile));
             }
         }
-        let Some((news, _, tile)) = due else {
+        let Some((_, _, tile)) = due else {
             return Effects::new();
         };
-        self.note_urgent(tile, news);
+        let is_new = self.news_of(tile, (of, newer_ms)) == News::Urgent;
+        self.note_urgent(tile, is_new);
         self.news.remove(&tile);
         self.told.insert(tile, now);
         self.said_at = now;
@@ -341,12 +342,13 @@ impl Gathering {
         effects
     }
 
-    /// What is urgent is told more than once.
-    fn note_urgent(&mut self, tile: u16, news: News) {
-        let left = match self.again.get(&tile) {
-            Some(left) => left - 1,
-            None if news == News::Urgent => URGENT_TIMES - 1,
-            None => 0,
+    /// What is urgent is told more than once: as often as ever where more of the tile became so
+    /// before that was done.
+    fn note_urgent(&mut self, tile: u16, is_new: bool) {
+        let left = if is_new {
+            URGENT_TIMES - 1
+        } else {
+            self.again.get(&tile).map_or(0, |left| left - 1)
         };
         if left > 0 {
             self.again.insert(tile, left);

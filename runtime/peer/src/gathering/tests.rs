@@ -188,6 +188,24 @@ fn what_became_too_dense_is_told_three_times_two_intervals_apart() {
     assert_eq!(told_s, [0, 2, 4]);
 }
 
+/// What became urgent while something else of the tile was being told again is told as often.
+#[test]
+fn what_is_urgent_beside_what_is_told_again_is_told_three_times_too() {
+    let mut scene = Scene::new(7);
+    scene.look(400);
+    let since_s = scene.now_s;
+    let mut told_s = Vec::new();
+    for _ in 0..30 {
+        told_s.extend(scene.tell().iter().map(|_| scene.now_s - since_s));
+        if scene.now_s - since_s == 2 {
+            scene.look(10);
+        } else {
+            scene.now_s += 1;
+        }
+    }
+    assert_eq!(told_s, [0, 2, 3, 5, 7]);
+}
+
 #[test]
 fn what_is_no_news_waits_and_is_told_again_by_whoever_knows_it() {
     let mut scene = Scene::new(7);
