@@ -29,8 +29,9 @@
 //! calls give the same circle.
 //!
 //! # Complexity
-//! Once in [`EACH_MS`] [`RADII`] · [`PLACES`] circles of [`STEPS`] steps of the law, and
-//! `SAMPLES` lines of sight for each way that the target may drive.
+//! Once in [`EACH_MS`] [`RADII`] · [`PLACES`] circles at most of [`STEPS`] steps of the law, and
+//! `SAMPLES` lines of sight for each way that the target may drive; those that would not be better
+//! if they saw it all the time are left out.
 
 use super::flyable::least_radius_m;
 use super::follower::{Follower, StandOff, TargetMotion};
@@ -139,6 +140,10 @@ impl Vantage {
         let worth = |c: &Circle| scene.worth(c, stand_off_m);
         let mut best = (flown, worth(&flown) + BETTER);
         for circle in scene.tried(stand_off_m) {
+            // One that is not better though all of it sees the target need not be flown ahead.
+            if less_cost(1.0, &circle, stand_off_m) <= best.1 {
+                continue;
+            }
             let worth = worth(&circle);
             if worth > best.1 {
                 best = (circle, worth);
@@ -269,10 +274,16 @@ impl<'a> Scene<'a> {
             }
             counts *= fades;
         }
-        let smaller = (stand_off_m - circle.radius_m).abs() / stand_off_m.max(1.0);
-        let aside = circle.beside.norm() / stand_off_m.max(1.0);
-        seen / f64::max(all, f64::MIN_POSITIVE) - OTHER * smaller - ASIDE * aside
+        let sight = seen / f64::max(all, f64::MIN_POSITIVE);
+        less_cost(sight, circle, stand_off_m)
     }
+}
+
+/// A share of sight, less what it costs to fly a circle that is not the stand-off's.
+fn less_cost(sight: f64, circle: &Circle, stand_off_m: f64) -> f64 {
+    let smaller = (stand_off_m - circle.radius_m).abs() / stand_off_m.max(1.0);
+    let aside = circle.beside.norm() / stand_off_m.max(1.0);
+    sight - OTHER * smaller - ASIDE * aside
 }
 
 /// 0, 1, 2 and so on, so many.
