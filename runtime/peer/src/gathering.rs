@@ -296,9 +296,10 @@ impl Gathering {
             .map(|((_, s), _)| s / SECTORS_EACH)
             .chain(self.own.keys().map(|s| s / SECTORS_EACH))
             .collect();
-        let mut due: Option<(News, u64, u16)> = None;
+        let mut due: Option<((bool, u64), u16, bool)> = None;
         for tile in tiles {
             let (mut news, mut since_ms) = (self.news_of(tile, (of, newer_ms)), 0);
+            let is_new = news == News::Urgent;
             if news == News::None {
                 self.news.remove(&tile);
                 let heard_ms = now.since_ms(*self.heard.entry(tile).or_insert(now));
@@ -323,14 +324,13 @@ impl Gathering {
             };
             // What waits longest goes first, or nothing would be told again while there is news.
             let order = (news == News::Urgent, since_ms);
-            if is_due && due.is_none_or(|d| order > (d.0 == News::Urgent, d.1)) {
-                due = Some((news, since_ms, tile));
+            if is_due && due.is_none_or(|d| order > d.0) {
+                due = Some((order, tile, is_new));
             }
         }
-        let Some((_, _, tile)) = due else {
+        let Some((_, tile, is_new)) = due else {
             return Effects::new();
         };
-        let is_new = self.news_of(tile, (of, newer_ms)) == News::Urgent;
         self.note_urgent(tile, is_new);
         self.news.remove(&tile);
         self.told.insert(tile, now);

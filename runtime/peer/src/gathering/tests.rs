@@ -174,36 +174,34 @@ fn what_became_too_dense_is_told_at_once_and_people_are_told_once() {
     assert!(!heard.is_empty() && heard.iter().all(|a| !a.is_dense));
 }
 
-/// Nobody repairs what is lost, so what is urgent is said three times.
-#[test]
-fn what_became_too_dense_is_told_three_times_two_intervals_apart() {
+/// When a tile is told that becomes too dense, and eases after so many seconds if it does: seconds
+/// since.
+fn told_s(eases_s: Option<u64>) -> Vec<u64> {
     let mut scene = Scene::new(7);
     scene.look(400);
     let since_s = scene.now_s;
     let mut told_s = Vec::new();
     for _ in 0..30 {
         told_s.extend(scene.tell().iter().map(|_| scene.now_s - since_s));
-        scene.now_s += 1;
-    }
-    assert_eq!(told_s, [0, 2, 4]);
-}
-
-/// What became urgent while something else of the tile was being told again is told as often.
-#[test]
-fn what_is_urgent_beside_what_is_told_again_is_told_three_times_too() {
-    let mut scene = Scene::new(7);
-    scene.look(400);
-    let since_s = scene.now_s;
-    let mut told_s = Vec::new();
-    for _ in 0..30 {
-        told_s.extend(scene.tell().iter().map(|_| scene.now_s - since_s));
-        if scene.now_s - since_s == 2 {
+        if eases_s == Some(scene.now_s - since_s + 1) {
             scene.look(10);
         } else {
             scene.now_s += 1;
         }
     }
-    assert_eq!(told_s, [0, 2, 3, 5, 7]);
+    told_s
+}
+
+/// Nobody repairs what is lost, so what is urgent is said three times.
+#[test]
+fn what_became_too_dense_is_told_three_times_two_intervals_apart() {
+    assert_eq!(told_s(None), [0, 2, 4]);
+}
+
+/// What became urgent while something else of the tile was being told again is told as often.
+#[test]
+fn what_is_urgent_beside_what_is_told_again_is_told_three_times_too() {
+    assert_eq!(told_s(Some(3)), [0, 2, 3, 5, 7]);
 }
 
 #[test]
