@@ -198,15 +198,9 @@ impl Rule {
         let to = goal - own.position();
         let straight_rad = self.homing_rad(own, atan2(to.y, to.x), goal);
         let mut best = (f64::INFINITY, straight_rad);
-        for k in -COURSES / 2..=COURSES / 2 {
-            let beside_rad = TAU * f64::from(k) / f64::from(COURSES);
-            let deviation = if k > 0 {
-                LEFT_FACTOR * beside_rad
-            } else {
-                -beside_rad
-            };
+        for (deviation, beside_rad) in courses() {
             if deviation >= best.0 {
-                continue;
+                break;
             }
             let way = self.way(own, straight_rad + beside_rad);
             let short = contacts.iter().map(|c| self.short_m(&way, c));
@@ -295,6 +289,23 @@ impl Rule {
         let own_rate = self.airspeed_mps / self.circle_m;
         (own_rate - airspeed_mps / circle_m).abs() <= SAME_RATE * own_rate
     }
+}
+
+/// What a course costs by itself and how far it is beside the wanted one, radians, to the left
+/// where positive: what costs least first, of the same cost the one to the right.
+fn courses() -> impl Iterator<Item = (f64, f64)> {
+    let beside_rad = |k: i32| TAU * f64::from(k) / f64::from(COURSES);
+    let right = (0..=COURSES / 2).map(move |k| beside_rad(-k));
+    let mut right = right.map(|beside_rad| (-beside_rad, beside_rad)).peekable();
+    let left = (1..=COURSES / 2).map(beside_rad);
+    let mut left = left
+        .map(|beside_rad| (LEFT_FACTOR * beside_rad, beside_rad))
+        .peekable();
+    core::iter::from_fn(move || match (right.peek(), left.peek()) {
+        (Some(r), Some(l)) if r.0 > l.0 => left.next(),
+        (Some(_), _) => right.next(),
+        (None, _) => left.next(),
+    })
 }
 
 /// A course, and what it does to the circle to the right.
@@ -392,6 +403,17 @@ mod tests {
     fn any_pose() -> impl Strategy<Value = Pose> {
         (-300.0..300.0, -300.0..300.0, -3.1..3.1)
             .prop_map(|(x, y, h)| Pose::new(Point::new(x, y), h))
+    }
+
+    #[test]
+    fn courses_are_tried_once_each_and_the_cheapest_first() {
+        let all: Vec<(f64, f64)> = courses().collect();
+        assert_eq!(all.len(), 73);
+        assert!(all.windows(2).all(|w| w[0].0 <= w[1].0), "{all:?}");
+        let mut beside: Vec<f64> = all.iter().map(|(_, beside_rad)| *beside_rad).collect();
+        beside.sort_by(f64::total_cmp);
+        beside.dedup();
+        assert_eq!(beside.len(), 73);
     }
 
     proptest! {

@@ -34,7 +34,7 @@ use skein_behaviors::Percept;
 use skein_behaviors::view::View;
 use skein_flight::airframe::Airframe;
 use skein_flight::mount::DIRECTION_OFF_RAD;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 mod estimate;
@@ -292,10 +292,11 @@ impl Gathering {
         let again_ms = AGAIN * interval_ms + RANK_INTERVALS * beacon_ms * rank;
         let is_turn = now.since_ms(self.said_at) >= TURN_INTERVALS * beacon_ms * uavs;
         let known = self.known.range((of, 0)..=(of, u16::MAX));
-        let tiles: BTreeSet<u16> = known
-            .map(|((_, s), _)| s / SECTORS_EACH)
-            .chain(self.own.keys().map(|s| s / SECTORS_EACH))
-            .collect();
+        let known = known.map(|((_, s), _)| s / SECTORS_EACH);
+        let own = self.own.keys().map(|s| s / SECTORS_EACH);
+        let mut tiles: Vec<u16> = known.chain(own).collect();
+        tiles.sort_unstable();
+        tiles.dedup();
         let mut due: Option<((bool, u64), u16, bool)> = None;
         for tile in tiles {
             let (mut news, mut since_ms) = (self.news_of(tile, (of, newer_ms)), 0);

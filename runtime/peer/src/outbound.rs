@@ -85,7 +85,8 @@ pub(crate) struct Outbound {
     last_claim: Time,
     last_cover: Time,
     coverage_told: CoverageTold,
-    mission_said: Option<u64>,
+    /// The mission that was said last, and its content hash.
+    mission_said: Option<(Arc<Mission>, u64)>,
 }
 
 impl Outbound {
@@ -249,11 +250,16 @@ impl Outbound {
         let Some(mission) = &s.mission else {
             return Effects::new();
         };
-        let hash = mission.content_hash();
-        if self.mission_said == Some(hash) {
+        let said = self.mission_said.as_ref();
+        if said.is_some_and(|(said, _)| Arc::ptr_eq(said, mission)) {
             return Effects::new();
         }
-        self.mission_said = Some(hash);
+        let hash = mission.content_hash();
+        let is_said = said.is_some_and(|(_, said)| *said == hash);
+        self.mission_said = Some((Arc::clone(mission), hash));
+        if is_said {
+            return Effects::new();
+        }
         match chunks(mission) {
             Ok(pieces) => {
                 let mut pieces: Vec<_> = (0u16..).zip(pieces).collect();

@@ -49,7 +49,9 @@ pub struct Crowd {
     /// South-west corner of the cells, counted in cells from the origin, and how many.
     low: (i32, i32),
     size: (i32, i32),
-    cells: Vec<u16>,
+    /// How many are south-west of each corner of the cells, row after row: one more a row than
+    /// cells, and one row more.
+    south_west: Vec<u32>,
     second: u64,
     /// A recogniser looks at one picture in this time, milliseconds: that of the first percept of
     /// each second.
@@ -158,13 +160,13 @@ impl Crowd {
             all().map(|c| c.1).max().unwrap_or(0),
         );
         let size = (high.0 - low.0 + 1, high.1 - low.1 + 1);
-        let n = usize::try_from(i64::from(size.0) * i64::from(size.1)).unwrap_or(0);
+        let corners = (i64::from(size.0) + 1) * (i64::from(size.1) + 1);
         let mut crowd = Self {
             seed,
             ways,
             low,
             size,
-            cells: vec![0; n],
+            south_west: vec![0; usize::try_from(corners).unwrap_or(0)],
             second: u64::MAX,
             percept_ms: u64::from(percept_ms.max(1)),
         };
@@ -179,12 +181,21 @@ impl Crowd {
             return;
         }
         self.second = second;
-        self.cells.fill(0);
+        self.south_west.fill(0);
         for way in &self.ways {
-            let place = cell_of(at(way, 1_000 * second));
-            if let Some(i) = index(self.low, self.size, place) {
-                self.cells[i] = self.cells[i].saturating_add(1);
-            }
+            let (col, row) = cell_of(at(way, 1_000 * second));
+            let north_east = self.corner((col + 1, row + 1));
+            self.south_west[north_east] += 1;
+        }
+        let row_len = self.corner((self.low.0, self.low.1 + 1));
+        let mut west = 0;
+        for i in row_len..self.south_west.len() {
+            west = if i % row_len == 0 {
+                0
+            } else {
+                west + self.south_west[i]
+            };
+            self.south_west[i] = west + self.south_west[i - row_len];
         }
     }
 
@@ -206,11 +217,17 @@ impl Crowd {
         self.ways.len()
     }
 
+    /// Which corner of the cells one is, or the nearest of them: nobody is farther out.
+    fn corner(&self, (col, row): (i32, i32)) -> usize {
+        let within = |n: i32, size: i32| usize::try_from(n.clamp(0, size)).unwrap_or(0);
+        let row_len = within(self.size.0, self.size.0) + 1;
+        within(row - self.low.1, self.size.1) * row_len + within(col - self.low.0, self.size.0)
+    }
+
     fn in_cells(&self, low: (i32, i32), side: (i32, i32)) -> u32 {
-        let rows = low.1..low.1 + side.1;
-        let each = rows.flat_map(|row| (low.0..low.0 + side.0).map(move |col| (col, row)));
-        let each = each.filter_map(|cell| index(self.low, self.size, cell));
-        each.map(|i| u32::from(self.cells[i])).sum()
+        let high = (low.0 + side.0, low.1 + side.1);
+        let up_to = |corner: (i32, i32)| self.south_west[self.corner(corner)];
+        up_to(high) + up_to(low) - up_to((low.0, high.1)) - up_to((high.0, low.1))
     }
 
     /// How many are in a rectangle, whose corners are those of cells, now.
@@ -308,15 +325,6 @@ fn drawn(truly: u32, recognised: f64, random: &mut SplitMix64) -> u32 {
     seen + u32::from(random.unit() < FALSE_EACH)
 }
 
-/// Which cell of those that are kept one is.
-fn index(low: (i32, i32), size: (i32, i32), (col, row): (i32, i32)) -> Option<usize> {
-    let (c, r) = (col - low.0, row - low.1);
-    let is_kept = (0..size.0).contains(&c) && (0..size.1).contains(&r);
-    is_kept
-        .then(|| usize::try_from(i64::from(r) * i64::from(size.0) + i64::from(c)).ok())
-        .flatten()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -357,7 +365,7 @@ mod tests {
     }
 
     fn all(crowd: &Crowd) -> u32 {
-        crowd.cells.iter().map(|n| u32::from(*n)).sum()
+        crowd.in_cells(crowd.low, crowd.size)
     }
 
     #[test]
@@ -380,7 +388,32 @@ mod tests {
         let again = Crowd::new(spec.crowd.as_ref().unwrap(), 200, 4);
         let mut other = Crowd::new(spec.crowd.as_ref().unwrap(), 200, 5);
         other.advance(0);
-        assert!(again.cells != other.cells, "places are drawn from the seed");
+        assert!(
+            again.south_west != other.south_west,
+            "places are drawn from the seed"
+        );
+    }
+
+    #[test]
+    fn a_rectangle_holds_who_is_in_its_cells() {
+        let spec = spec();
+        let mut crowd = Crowd::new(spec.crowd.as_ref().unwrap(), 200, 4);
+        crowd.advance(20_000);
+        let mut random = SplitMix64::new(7);
+        let mut drawn = |n: i32| i32::try_from(random.below(n.unsigned_abs() as usize)).unwrap();
+        for _ in 0..200 {
+            let low = (
+                crowd.low.0 - 5 + drawn(crowd.size.0 + 10),
+                crowd.low.1 - 5 + drawn(crowd.size.1 + 10),
+            );
+            let side = (1 + drawn(30), 1 + drawn(30));
+            let is_in = |way: &&Vec<Step>| {
+                let (col, row) = cell_of(at(way, 20_000));
+                (low.0..low.0 + side.0).contains(&col) && (low.1..low.1 + side.1).contains(&row)
+            };
+            let counted = crowd.ways.iter().filter(is_in).count();
+            assert_eq!(crowd.in_cells(low, side) as usize, counted);
+        }
     }
 
     #[test]
