@@ -11,7 +11,7 @@
 //! arbitrary; it has this least value. (It prints ẏ = A cos(…) ẋ, where A′ is meant.)
 //! The curve lies in the air: so a wind changes nothing of it but the target's drift.
 
-use crate::trajectory::timed::elliptic::second_kind;
+use crate::trajectory::timed::elliptic::{first_kind, second_kind};
 use skein_geometry::math::{FRAC_PI_2, PI, TAU, asin, atan2, hypot, sin_cos};
 
 /// Crests are a tenth wider than the airframe could turn: what is left steers.
@@ -35,11 +35,23 @@ pub struct Weave {
     pub length_m: f64,
 }
 
+/// Newton's steps for a slope: five to ten do, but where there is next to none, for there each
+/// brings it nearer by half.
+const STEPS: u8 = 60;
+
 /// The length of a sinusoid of slope A′ over its progress.
 #[must_use]
 pub fn ratio_of(slope: f64) -> f64 {
     let square = slope * slope;
     second_kind(FRAC_PI_2, square / (1.0 + square)) * (1.0 + square).sqrt() / FRAC_PI_2
+}
+
+/// How that grows with the slope: by as much as it is more than the mean of the cosine of the
+/// direction, over the slope.
+fn growth_of(slope: f64, ratio: f64) -> f64 {
+    let square = slope * slope;
+    let cosine = first_kind(square / (1.0 + square)) / (1.0 + square).sqrt() / FRAC_PI_2;
+    (ratio - cosine) / slope
 }
 
 impl Weave {
@@ -51,21 +63,17 @@ impl Weave {
         if !(1.0..=LARGEST_RATIO).contains(&ratio) {
             return None;
         }
-        // The length of a wave is at least that of its ascents: σ ≥ 2A′/π.
-        let (mut low, mut high) = (0.0, FRAC_PI_2 * ratio);
-        for _ in 0..60 {
-            let middle = f64::midpoint(low, high);
-            // No number lies between them any more.
-            if middle <= low || middle >= high {
+        // The length of a wave is at least that of its ascents: σ ≥ 2A′/π. It is a convex
+        // function of A′, so from there on each step ends above the slope that is sought.
+        let mut slope = FRAC_PI_2 * ratio;
+        for _ in 0..STEPS {
+            let reached = ratio_of(slope);
+            let next = slope - (reached - ratio) / growth_of(slope, reached);
+            if !(0.0 < next && next < slope) {
                 break;
             }
-            if ratio_of(middle) < ratio {
-                low = middle;
-            } else {
-                high = middle;
-            }
+            slope = next;
         }
-        let slope = f64::midpoint(low, high);
         let crest_m = TAU * slope * turn_radius_m * CREST_ROOM;
         let length_m = crest_m.max(SHORTEST_RADII * turn_radius_m);
         Some(Self {
@@ -97,9 +105,14 @@ impl Weave {
     /// the mean, metres; nothing where it crosses the middle line.
     #[must_use]
     pub fn ahead_m(&self, phase_rad: f64) -> f64 {
+        self.ahead_of_m(phase_rad, ratio_of(self.slope))
+    }
+
+    /// The same, whose length over its progress is known.
+    fn ahead_of_m(&self, phase_rad: f64, ratio: f64) -> f64 {
         let square = self.slope * self.slope;
         let of_length = second_kind(phase_rad, square / (1.0 + square)) * (1.0 + square).sqrt();
-        (phase_rad - of_length / ratio_of(self.slope)) * self.length_m / TAU
+        (phase_rad - of_length / ratio) * self.length_m / TAU
     }
 
     /// The phase of a place beside the middle line, metres, climbing from it to the left or
@@ -116,9 +129,10 @@ impl Weave {
     pub fn farthest_m(&self) -> f64 {
         const PARTS: u32 = 16;
         // It is alike to both sides and both ways: a quarter tells all.
+        let ratio = ratio_of(self.slope);
         let far = |k: u32| {
             let phase = FRAC_PI_2 * f64::from(k) / f64::from(PARTS);
-            hypot(self.at(phase).2, self.ahead_m(phase))
+            hypot(self.at(phase).2, self.ahead_of_m(phase, ratio))
         };
         (0..=PARTS).map(far).fold(0.0, f64::max)
     }
@@ -148,6 +162,16 @@ mod tests {
         assert_eq!(Weave::of(0.99, 70.0), None);
         assert_eq!(Weave::of(f64::NAN, 70.0), None);
         assert_eq!(Weave::of(LARGEST_RATIO + 0.1, 70.0), None);
+    }
+
+    #[test]
+    fn steps_suffice_from_flat_to_steep() {
+        for k in 0..=500 {
+            let ratio = 1.0 + (LARGEST_RATIO - 1.0) * (f64::from(k) / 500.0).powi(8);
+            let w = Weave::of(ratio, 70.0).unwrap();
+            let off = ratio_of(w.slope) - ratio;
+            assert!(off.abs() < 4e-15 * ratio, "{ratio}: {off}");
+        }
     }
 
     proptest! {

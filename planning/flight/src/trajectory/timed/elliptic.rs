@@ -1,5 +1,6 @@
 //! The incomplete elliptic integral of the second kind, which is what lengths of
-//! trochoids and times along circles in wind come to.
+//! trochoids and times along circles in wind come to, and the complete one of the first kind,
+//! by which it grows.
 //!
 //! By Carlson's symmetric integrals (NIST Digital Library of Mathematical Functions,
 //! 19.25.9 and 19.36): duplication until the arguments are alike, then a series.
@@ -55,6 +56,11 @@ pub(super) fn second_kind_between(from: f64, to: f64, m: f64) -> f64 {
         i += 1.0;
     }
     sum * half
+}
+
+/// K(m): the integral of 1/√(1 − m sin²) over a quarter turn, for 0 ≤ m < 1.
+pub(crate) fn first_kind(m: f64) -> f64 {
+    first(0.0, 1.0 - m)
 }
 
 /// E(φ | m): the integral of √(1 − m sin²) from 0 to `phi`, for 0 ≤ m ≤ 1.
@@ -138,6 +144,9 @@ mod tests {
         assert!((second_kind(PI / 2.0, 0.75) - 1.211_056_027_568_459_4).abs() < 1e-14);
         assert!((second_kind(1.0, 0.0) - 1.0).abs() < 1e-15);
         assert!((second_kind(2.0, 1.0) - (2.0 - sin(2.0))).abs() < 1e-15);
+        // A quarter of the period of a pendulum let go at a right angle (m = 1/2).
+        assert!((first_kind(0.5) - 1.854_074_677_301_372).abs() < 1e-14);
+        assert!((first_kind(0.0) - PI / 2.0).abs() < 1e-15);
     }
 
     proptest! {
