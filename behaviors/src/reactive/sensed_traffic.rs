@@ -152,10 +152,11 @@ impl Rule {
             return true;
         };
         // Whose circles cross at unlike rates has nothing to keep, and what is predicted decides.
-        if now.clearance_m().abs() <= 0.0 {
+        let before_m = now.clearance_m();
+        if before_m.abs() <= 0.0 {
             return true;
         }
-        let spare_m = now.clearance_m().abs() - self.separation_m - self.errors_m;
+        let spare_m = before_m.abs() - self.separation_m - self.errors_m;
         let turn = |pose: &Pose, curvature_per_m: f64, length_m: f64| {
             let step = Segment {
                 start: *pose,
@@ -176,7 +177,7 @@ impl Rule {
             let Some(after) = self.pair(&then, &circled) else {
                 return true;
             };
-            let (before_m, after_m) = (now.clearance_m(), after.clearance_m());
+            let after_m = after.clearance_m();
             let gained_m = after_m.abs() - before_m.abs();
             let moved_m = (after.own_centre - now.own_centre).norm();
             let theirs_m = self.reach_m(contact.airspeed_mps);

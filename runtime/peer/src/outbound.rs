@@ -85,8 +85,7 @@ pub(crate) struct Outbound {
     last_claim: Time,
     last_cover: Time,
     coverage_told: CoverageTold,
-    /// The mission that was said last, and its content hash.
-    mission_said: Option<(Arc<Mission>, u64)>,
+    mission_said: Option<Arc<Mission>>,
 }
 
 impl Outbound {
@@ -250,14 +249,11 @@ impl Outbound {
         let Some(mission) = &s.mission else {
             return Effects::new();
         };
-        let said = self.mission_said.as_ref();
-        if said.is_some_and(|(said, _)| Arc::ptr_eq(said, mission)) {
-            return Effects::new();
-        }
-        let hash = mission.content_hash();
-        let is_said = said.is_some_and(|(_, said)| *said == hash);
-        self.mission_said = Some((Arc::clone(mission), hash));
-        if is_said {
+        let is_same = |said: Arc<Mission>| {
+            Arc::ptr_eq(&said, mission) || said.content_hash() == mission.content_hash()
+        };
+        let said = self.mission_said.replace(Arc::clone(mission));
+        if said.is_some_and(is_same) {
             return Effects::new();
         }
         match chunks(mission) {

@@ -24,6 +24,10 @@ const SHORTEST_RADII: f64 = 3.0;
 /// nobody who can circle flies them.
 pub const LARGEST_RATIO: f64 = 6.0;
 
+/// Newton's steps for a slope: five to ten do, but where there is next to none, for there each
+/// brings it nearer by half.
+const STEPS: u8 = 60;
+
 /// A sinusoid in the air mass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weave {
@@ -34,10 +38,6 @@ pub struct Weave {
     /// Its period D along the middle line, metres.
     pub length_m: f64,
 }
-
-/// Newton's steps for a slope: five to ten do, but where there is next to none, for there each
-/// brings it nearer by half.
-const STEPS: u8 = 60;
 
 /// The length of a sinusoid of slope A′ over its progress.
 #[must_use]
