@@ -427,16 +427,18 @@ impl Membership {
         changes
     }
 
-    /// A neighbour is heard itself. If it was away, it heard of nobody meanwhile who was not.
+    /// A neighbour is heard itself. If it was away, it heard of nobody meanwhile who was there
+    /// before it came back.
     fn meet(&mut self, now: Time, neighbour: u16, interval_ms: u64) {
         let known = self.known.get_mut(&neighbour);
-        let Some(since) = known.and_then(|k| k.meet(now, interval_ms)) else {
+        let Some(absence) = known.and_then(|k| k.meet(now, interval_ms)) else {
             return;
         };
         let others = self.known.iter_mut().filter(|(id, _)| **id != neighbour);
-        let there = others.filter(|(_, k)| k.is_believed() && !k.was_away(now, interval_ms));
+        let there =
+            others.filter(|(_, k)| k.is_believed() && k.was_there(absence.until, interval_ms));
         for (_, other) in there {
-            other.note_unknown_to(now, neighbour, since, interval_ms);
+            other.note_unknown_to(now, neighbour, absence.since, interval_ms);
         }
     }
 

@@ -10,6 +10,10 @@ use crate::output::Status;
 use crate::protocol::airtime::ms_of;
 use crate::wire::message::{Fresh, Gossip};
 
+/// Of those who come back together the first and the last are heard of so many intervals after
+/// one another at most, as a rule: news of them goes first, some in each beacon.
+const TOGETHER_INTERVALS: u64 = 5;
+
 /// An age that grows: so much when it was heard, and the time since.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Age {
@@ -177,11 +181,11 @@ impl Lag {
 
 /// Somebody was held for down, and is there again.
 #[derive(Clone, Copy, Debug)]
-struct Absence {
+pub(super) struct Absence {
     /// When the heartbeat was sent that was known of it meanwhile.
-    since: Time,
+    pub(super) since: Time,
     /// When it was heard of again.
-    until: Time,
+    pub(super) until: Time,
     /// Whether it was heard itself since.
     is_met: bool,
 }
@@ -400,23 +404,22 @@ impl Known {
         self.hops = NO_HOPS;
     }
 
-    /// Whether it was held for down, and is there again of late.
-    pub(super) fn was_away(&self, now: Time, interval_ms: u64) -> bool {
-        let lately_ms = HOP_INTERVALS * interval_ms;
+    /// Whether it was there before somebody came back then, or came back with that one: of those
+    /// who come together, the first and the last are heard of that long after one another.
+    pub(super) fn was_there(&self, before: Time, interval_ms: u64) -> bool {
         self.absence
-            .is_some_and(|a| now.since_ms(a.until) <= lately_ms)
+            .is_none_or(|a| before.since_ms(a.until) > TOGETHER_INTERVALS * interval_ms)
     }
 
-    /// It is heard itself. When its absence began, if it is over of late and this is the first
-    /// time since.
-    pub(super) fn meet(&mut self, now: Time, interval_ms: u64) -> Option<Time> {
-        let is_late = !self.was_away(now, interval_ms);
+    /// It is heard itself. Its absence, if it is over of late and this is the first time since.
+    pub(super) fn meet(&mut self, now: Time, interval_ms: u64) -> Option<Absence> {
         let absence = self.absence.as_mut()?;
         let is_met = std::mem::replace(&mut absence.is_met, true);
-        (!is_met && !is_late).then_some(absence.since)
+        let is_late = now.since_ms(absence.until) > HOP_INTERVALS * interval_ms;
+        (!is_met && !is_late).then_some(*absence)
     }
 
-    /// A neighbour was away since then, and this one was not: nobody told that one of it.
+    /// A neighbour was away since then, and this one was there: nobody told that one of it.
     pub(super) fn note_unknown_to(
         &mut self,
         now: Time,

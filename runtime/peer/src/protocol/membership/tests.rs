@@ -680,6 +680,30 @@ fn who_comes_back_is_told_of_those_who_stayed() {
     assert_eq!(m.known[&8].want(now.plus_ms(5_000)), lag);
 }
 
+/// Peers 20 to 22 were away for a minute. 20 comes back by itself, 21 and 22 eight seconds later:
+/// whoever hears them tells them of 20 as of those who stayed, and not of each other.
+#[test]
+fn who_came_back_before_is_told_of_to_who_comes_back_now() {
+    let mut m = Membership::new(1, 1000);
+    for id in [2, 20, 21, 22] {
+        m.on_beacon(Time(0), id, 1, &beacon(5, Vec::new()));
+    }
+    let mut at = Time(0);
+    for t in 1..=68 {
+        at = Time(1_000 * t);
+        let count = 5 + 2 * u32::try_from(t).unwrap();
+        m.on_beacon(at, 2, 1, &beacon(count, Vec::new()));
+        if t >= 60 {
+            m.on_beacon(at, 20, 1, &beacon(count, Vec::new()));
+        }
+        m.tick(at);
+    }
+    m.on_heartbeat(at, 21, 1, (91, 4));
+    m.on_heartbeat(at, 22, 1, (91, 4));
+    assert!([2, 20].iter().all(|id| m.known[id].is_wanted(at)));
+    assert!([21, 22].iter().all(|id| !m.known[id].is_wanted(at)));
+}
+
 #[test]
 fn where_not_all_fit_most_of_the_room_is_for_heartbeats_alone() {
     let mut m = among_nineteen();
