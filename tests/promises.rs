@@ -14,6 +14,8 @@
 use skein_peer::PeerId;
 use skein_peer::protocol::promises::{Promises, Statement};
 use stateright::{Checker, Model, Property};
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Deref;
 use std::sync::Arc;
@@ -45,6 +47,29 @@ impl Case {
         let meets = |p: &(Way, Way)| *p == (*a, *b) || *p == (*b, *a);
         !self.conflicts.iter().any(meets)
     }
+
+    fn step(&self, uav: &Part<Promises<Way>>, step: &Step<'_>) -> Become {
+        BECAME.with_borrow_mut(|became| {
+            let after = became.entry((uav.hash, hash_of(step)));
+            let fresh = after.or_insert_with(|| {
+                let mut uav = Promises::clone(uav);
+                match step {
+                    Step::Propose(way) => uav.propose(*way),
+                    Step::Withdraw => {
+                        let _ = uav.withdraw();
+                    }
+                    Step::Hear(author, said) => {
+                        let is_newer = uav.hear(*author, said);
+                        assert!(is_newer, "what is not newer is not delivered");
+                    }
+                }
+                let _ = uav.settle(true, &|_| true, &|a, b| self.apart(a, b));
+                let said = Part::new(uav.statement());
+                (Part::new(uav), said)
+            });
+            fresh.clone()
+        })
+    }
 }
 
 /// A part of a state. A step changes one or two of them: the others are shared with the state
@@ -55,21 +80,20 @@ struct Part<T> {
     hash: u64,
 }
 
-impl<T: Clone + Hash> Part<T> {
+impl<T: Hash> Part<T> {
     fn new(of: T) -> Self {
-        let mut hasher = DefaultHasher::new();
-        of.hash(&mut hasher);
+        let hash = hash_of(&of);
         Self {
             of: Arc::new(of),
-            hash: hasher.finish(),
+            hash,
         }
     }
+}
 
-    fn change(&mut self, with: impl FnOnce(&mut T)) {
-        let mut of = T::clone(&self.of);
-        with(&mut of);
-        *self = Self::new(of);
-    }
+fn hash_of(of: &impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    of.hash(&mut hasher);
+    hasher.finish()
 }
 
 impl<T> Deref for Part<T> {
@@ -86,13 +110,24 @@ impl<T> Hash for Part<T> {
     }
 }
 
+type Said = Part<Statement<Way>>;
+
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Sky {
     uavs: Vec<Part<Promises<Way>>>,
     made: [u8; UAVS_MOST],
-    air: Vec<Part<Vec<Statement<Way>>>>,
+    air: Vec<Part<Vec<Said>>>,
     /// The number of the newest statement that each heard of each.
     heard: [[u32; UAVS_MOST]; UAVS_MOST],
+}
+
+/// What becomes of a UAV, and what it says then.
+type Become = (Part<Promises<Way>>, Said);
+
+thread_local! {
+    /// What became of a UAV in such a state by such a step: it met the same one in many states of
+    /// the others. A thread works on one search.
+    static BECAME: RefCell<HashMap<(u64, u64), Become>> = RefCell::default();
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,21 +141,28 @@ enum Action {
     },
 }
 
+/// What happens to one UAV.
+#[derive(Hash)]
+enum Step<'a> {
+    Propose(Way),
+    Withdraw,
+    Hear(PeerId, &'a Said),
+}
+
 fn id(nth: usize) -> PeerId {
     PeerId(u16::try_from(nth + 1).unwrap())
 }
 
 impl Sky {
     /// What a UAV has to say goes on the air.
-    fn say(&mut self, i: usize) {
-        let said = self.uavs[i].statement();
+    fn say(&mut self, i: usize, said: Said) {
         if self.air[i].last() != Some(&said) {
-            self.air[i].change(|air| {
-                air.push(said);
-                if air.len() > ON_AIR {
-                    air.remove(0);
-                }
-            });
+            let mut air = Vec::clone(&self.air[i]);
+            air.push(said);
+            if air.len() > ON_AIR {
+                air.remove(0);
+            }
+            self.air[i] = Part::new(air);
         }
     }
 
@@ -130,9 +172,10 @@ impl Sky {
             let others = self.heard.iter().take(self.uavs.len()).enumerate();
             let others = others.filter(|(i, _)| *i != author);
             let least = others.map(|(_, of)| of[author]).min();
-            let is_news = |said: &Statement<Way>| least.is_none_or(|least| said.number > least);
+            let is_news = |said: &Said| least.is_none_or(|least| said.number > least);
             if !air.iter().all(is_news) {
-                air.change(|air| air.retain(is_news));
+                let left = air.iter().filter(|said| is_news(said));
+                *air = Part::new(left.cloned().collect());
             }
         }
     }
@@ -183,32 +226,22 @@ impl Model for Case {
     }
 
     fn next_state(&self, sky: &Sky, action: Action) -> Option<Sky> {
-        let apart = |a: &Way, b: &Way| self.apart(a, b);
-        let who = match action {
-            Action::Propose(i, _) | Action::Withdraw(i) | Action::Deliver { to: i, .. } => i,
-        };
         let mut next = sky.clone();
-        match action {
-            Action::Propose(i, _) => next.made[i] += 1,
+        let (who, step) = match action {
+            Action::Propose(i, way) => {
+                next.made[i] += 1;
+                (i, Step::Propose((id(i).0, way)))
+            }
+            Action::Withdraw(i) => (i, Step::Withdraw),
             Action::Deliver { author, nth, to } => {
-                next.heard[to][author] = sky.air[author][nth].number;
+                let said = &sky.air[author][nth];
+                next.heard[to][author] = said.number;
+                (to, Step::Hear(id(author), said))
             }
-            Action::Withdraw(_) => {}
-        }
-        next.uavs[who].change(|u| {
-            match action {
-                Action::Propose(i, way) => u.propose((id(i).0, way)),
-                Action::Withdraw(_) => {
-                    let _ = u.withdraw();
-                }
-                Action::Deliver { author, nth, .. } => {
-                    let is_newer = u.hear(id(author), &sky.air[author][nth]);
-                    assert!(is_newer, "what is not newer is not delivered");
-                }
-            }
-            let _ = u.settle(true, &|_| true, &apart);
-        });
-        next.say(who);
+        };
+        let (uav, said) = self.step(&sky.uavs[who], &step);
+        next.uavs[who] = uav;
+        next.say(who, said);
         next.clear_air();
         Some(next)
     }

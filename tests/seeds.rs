@@ -62,6 +62,9 @@ fn walls() -> Spec {
     scenario.expect("it can be flown").spec
 }
 
+/// What flies, and how long it takes without faults, milliseconds.
+type Flown = (Prepared, u64);
+
 /// One kept line.
 struct Kept {
     line: String,
@@ -105,7 +108,7 @@ impl Kept {
         format!("{} {:?} {:?}", self.scenario, self.launch, self.uavs)
     }
 
-    fn fly(&self, (prepared, free_ms): &(Prepared, u64)) -> Outcome {
+    fn fly(&self, (prepared, free_ms): &Flown) -> Outcome {
         if self.is_storm {
             runs::storm(prepared, self.seed, *free_ms, Wanted::default())
         } else {
@@ -138,37 +141,51 @@ fn kept() -> Vec<Kept> {
     files.into_iter().flat_map(of_file).collect()
 }
 
+/// Works on each, by all processors.
+fn by_all_processors<T: Sync>(all: &[T], work: impl Fn(&T) + Sync) {
+    let next = AtomicUsize::new(0);
+    let workers = available_parallelism().map_or(1, usize::from);
+    scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    work(one);
+                }
+            });
+        }
+    });
+}
+
 /// Flown by all processors: it is the last test of its binary, and the longest.
 #[test]
 fn seeds_that_once_failed_hold() {
     let kept = kept();
     assert!(!kept.is_empty(), "no seed is kept");
-    let places: BTreeMap<String, OnceLock<(Prepared, u64)>> =
-        kept.iter().map(|k| (k.place(), OnceLock::new())).collect();
-    let (next, failed) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    let work = || {
-        while let Some(kept) = kept.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let place = places[&kept.place()].get_or_init(|| {
-                let prepared = prepared(&kept.scenario, kept.launch, kept.uavs);
-                let free_ms = runs::failure_free_makespan_ms(&prepared);
-                (prepared, free_ms)
-            });
-            let broken = kept.failure(&kept.fly(place));
-            failed.lock().unwrap().extend(broken);
-        }
-    };
-    let workers = available_parallelism().map_or(1, usize::from);
-    scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(work);
-        }
+    // All places first: lines of one stand beside each other, and would wait for each other.
+    let places: BTreeMap<String, (&Kept, OnceLock<Flown>)> = kept
+        .iter()
+        .map(|k| (k.place(), (k, OnceLock::new())))
+        .collect();
+    let unprepared: Vec<_> = places.values().collect();
+    by_all_processors(&unprepared, |(kept, place)| {
+        place.get_or_init(|| {
+            let prepared = prepared(&kept.scenario, kept.launch, kept.uavs);
+            let free_ms = runs::failure_free_makespan_ms(&prepared);
+            (prepared, free_ms)
+        });
+    });
+    let place = |kept: &Kept| places[&kept.place()].1.get().unwrap();
+    let failed = Mutex::new(Vec::new());
+    by_all_processors(&kept, |kept| {
+        let broken = kept.failure(&kept.fly(place(kept)));
+        failed.lock().unwrap().extend(broken);
     });
     let mut failed = failed.into_inner().unwrap();
     failed.sort();
     assert!(failed.is_empty(), "{}", failed.join("\n"));
     // Once is enough to see that a run repeats itself.
     let first = &kept[0];
-    let again = [(); 2].map(|()| first.fly(places[&first.place()].get().unwrap()));
+    let again = [(); 2].map(|()| first.fly(place(first)));
     assert_eq!(
         again[0].history_hash, again[1].history_hash,
         "{}",
