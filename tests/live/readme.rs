@@ -29,6 +29,8 @@ struct Readme {
     named: BTreeSet<String>,
     run: BTreeSet<String>,
     place: Place,
+    /// Whether trials of other tests may go on meanwhile.
+    is_aside: bool,
 }
 
 impl Readme {
@@ -38,6 +40,7 @@ impl Readme {
             named: named(&text).into_iter().collect(),
             run: BTreeSet::new(),
             place: Place::new(),
+            is_aside: true,
         }
     }
 
@@ -60,9 +63,22 @@ impl Readme {
         let words = words(filled);
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         let mut command = self.place.command(&words);
+        if self.is_aside {
+            command = aside(&command);
+        }
         command.current_dir(self.place.path(""));
         command
     }
+}
+
+/// The command with what others leave of the processors.
+fn aside(command: &Command) -> Command {
+    let mut aside = Command::new("nice");
+    aside.args(["-n", "19"]);
+    aside.arg(command.get_program()).args(command.get_args());
+    aside.envs(command.get_envs().filter_map(|(k, v)| Some((k, v?))));
+    aside.stdin(Stdio::null());
+    aside
 }
 
 /// Runs it to its end, which has to be a good one.
@@ -157,11 +173,12 @@ fn serves_a_page(command: Command, of_a_run: bool) {
 
 #[test]
 fn every_command_of_the_readme_is_run() {
-    let _alone = alone();
     let mut readme = Readme::new();
     on_the_ground(&mut readme);
     plans(&mut readme);
     a_simulated_run(&mut readme);
+    readme.is_aside = false;
+    let _alone = alone();
     a_trial_on_a_terminal(&mut readme);
     a_trial_with_everything(&mut readme);
     let left: Vec<&String> = readme.named.difference(&readme.run).collect();

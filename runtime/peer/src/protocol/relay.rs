@@ -20,7 +20,7 @@
 //! | a piece of a mission | it is due | of all that wait goes first what is new in a revision, until somebody passes it on or it was said eight times, then what was never on the air, then what most lack, what nobody passed on, what was on the air longest ago |
 //! | this peer's own | it is written | held; sent at once, a bid within 200 ms |
 //! | this peer's own bid, claim or order | it was sent, and nobody is heard passing it on | sent again, twice at most |
-//! | waiting | the share allows it, it is this peer's own bid or claim and was not sent yet, or nothing is due earlier | sent |
+//! | waiting | the share allows it, it is this peer's own bid or claim and was not sent yet, or its coverage and as much else went since the last of it, or nothing is due earlier | sent |
 //! | waiting for its random time | something is sent, one transmission holds both, and more than twelve share the channel | sent with it |
 //! | waiting | its lifetime is over, or the queue is full of what is more urgent | not sent |
 //!
@@ -481,7 +481,8 @@ impl Relay {
     /// it; and so does that its mission is finished, which is so short that nothing waits for it.
     /// Sent again it waits its turn, or what this peer has seen would never be said.
     /// Its coverage goes next: nobody passes it on, and claims that others wrote and that wait for
-    /// longer than coverage lives would never let it go.
+    /// longer than coverage lives would never let it go. But as much of the rest goes between:
+    /// after parts of a swarm meet, each has coverage to tell for half a minute.
     fn standing(&self, key: &RecordKey, priority: Priority) -> Standing {
         let unsaid = || self.held.get(key).is_some_and(|h| h.copies == 0);
         let is_end = key.1 == Kind::Finished.number();
@@ -812,7 +813,8 @@ impl Relay {
         if lent.is_none() && !self.air.pay(now, held.bytes.len()) {
             return None;
         }
-        self.queue.remove(&key);
+        let share_bytes = if lent.is_none() { held.bytes.len() } else { 0 };
+        self.queue.sent(&key, share_bytes);
         held.lack = 0;
         held.sent = now;
         held.copies = held.copies.saturating_add(1);

@@ -14,7 +14,7 @@ pub const MAX_QUEUE: usize = 128;
 pub(super) enum Standing {
     /// Nobody else can say it, and it was not said yet.
     First,
-    /// This peer's coverage.
+    /// This peer's coverage: as much of the others goes before more of it.
     Coverage,
     /// Its turn comes when it is due.
     Due,
@@ -46,6 +46,8 @@ pub(super) struct Queue {
     /// Before this no lifetime is over.
     first_until: Time,
     pieces: usize,
+    /// So many bytes of what is due go before more coverage.
+    owed_bytes: usize,
     /// As it was last asked for; nothing where the queue changed since.
     turn: Cell<Option<Turn>>,
 }
@@ -56,6 +58,7 @@ impl Queue {
             waiting: BTreeMap::new(),
             first_until: Time(u64::MAX),
             pieces: 0,
+            owed_bytes: 0,
             turn: Cell::new(None),
         }
     }
@@ -109,6 +112,16 @@ impl Queue {
             self.pieces -= usize::from(is_piece(key));
             self.turn.set(None);
         }
+    }
+
+    /// It is sent, and waits no more; so many bytes of it are paid from this peer's share.
+    pub(super) fn sent(&mut self, key: &RecordKey, share_bytes: usize) {
+        match self.waiting.get(key).map(|w| w.standing) {
+            Some(Standing::Coverage) => self.owed_bytes = share_bytes,
+            Some(Standing::Due) => self.owed_bytes = self.owed_bytes.saturating_sub(share_bytes),
+            Some(Standing::First) | None => {}
+        }
+        self.remove(key);
     }
 
     /// All of one author are void.
@@ -189,7 +202,8 @@ impl Queue {
     ) -> Option<(RecordKey, Priority)> {
         let may_go = |(k, w): &(&RecordKey, &Waiting)| w.from <= now || rides(k);
         let goes = self.waiting.iter().filter(may_go);
-        goes.min_by_key(|(k, w)| (w.from > now, w.standing, w.due, **k))
+        let yields = |w: &Waiting| w.standing == Standing::Coverage && self.owed_bytes > 0;
+        goes.min_by_key(|(k, w)| (w.from > now, yields(w), w.standing, w.due, **k))
             .map(|(k, w)| (*k, w.priority))
     }
 }
@@ -199,6 +213,44 @@ mod tests {
     use super::*;
     use crate::wire::kinds::Kind;
     use skein_geometry::random::SplitMix64;
+
+    fn waiting(standing: Standing) -> Waiting {
+        Waiting {
+            from: Time(0),
+            until: Time(9_000),
+            due: Time(0),
+            priority: Priority::Claim,
+            standing,
+        }
+    }
+
+    /// A peer learns of so much coverage that it has some to tell all the time, and passes on
+    /// what others claim.
+    #[test]
+    fn coverage_and_what_is_due_share_the_air_evenly() {
+        let mut queue = Queue::new();
+        let coverage: RecordKey = (1, Kind::Cover.number(), 0, 0);
+        queue.insert(coverage, waiting(Standing::Coverage));
+        for author in 2..=9 {
+            let claim = (author, Kind::Claim.number(), 0, 0);
+            queue.insert(claim, waiting(Standing::Due));
+        }
+        let mut order = Vec::new();
+        while let Some((key, _)) = queue.turn(Time(1)).first {
+            order.push(key.0);
+            queue.sent(&key, if key == coverage { 160 } else { 60 });
+            if order.len() < 8 {
+                queue.insert(coverage, waiting(Standing::Coverage));
+            }
+        }
+        assert_eq!(order, [1, 2, 3, 4, 1, 5, 6, 7, 1, 8, 9], "by bytes");
+        // What was said first still goes before both.
+        queue.insert(coverage, waiting(Standing::Coverage));
+        queue.insert((2, Kind::Claim.number(), 0, 0), waiting(Standing::Due));
+        queue.insert((1, Kind::Claim.number(), 0, 0), waiting(Standing::First));
+        let first = queue.turn(Time(1)).first.map(|(key, _)| key.1);
+        assert_eq!(first, Some(Kind::Claim.number()));
+    }
 
     #[test]
     fn the_turn_that_is_kept_is_the_one_that_is_looked_up() {
@@ -222,7 +274,8 @@ mod tests {
                     queue.make_room(&key);
                     queue.insert(key, waiting);
                 }
-                4 => queue.remove(&key),
+                4 if below(2) == 0 => queue.remove(&key),
+                4 => queue.sent(&key, below(200) as usize),
                 5 if below(100) == 0 => queue.remove_author(key.0),
                 _ => queue.expire(now),
             }
