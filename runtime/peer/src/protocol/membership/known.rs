@@ -404,8 +404,8 @@ impl Known {
         self.hops = NO_HOPS;
     }
 
-    /// Whether it was there before somebody came back then, or came back with that one: of those
-    /// who come together, the first and the last are heard of that long after one another.
+    /// Whether it was there well before somebody else came back at that time: who came back little
+    /// before that one, or after it, may have come with it.
     pub(super) fn was_there(&self, before: Time, interval_ms: u64) -> bool {
         self.absence
             .is_none_or(|a| before.since_ms(a.until) > TOGETHER_INTERVALS * interval_ms)
