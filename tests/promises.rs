@@ -48,10 +48,11 @@ impl Case {
         !self.conflicts.iter().any(meets)
     }
 
+    /// What becomes of a UAV by a step; looked up where it was met before.
     fn step(&self, uav: &Part<Promises<Way>>, step: &Step<'_>) -> Become {
         BECAME.with_borrow_mut(|became| {
             let after = became.entry((uav.hash, hash_of(step)));
-            let fresh = after.or_insert_with(|| {
+            let after = after.or_insert_with(|| {
                 let mut uav = Promises::clone(uav);
                 match step {
                     Step::Propose(way) => uav.propose(*way),
@@ -67,7 +68,7 @@ impl Case {
                 let said = Part::new(uav.statement());
                 (Part::new(uav), said)
             });
-            fresh.clone()
+            after.clone()
         })
     }
 }

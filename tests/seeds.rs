@@ -13,7 +13,7 @@ use skein_scenario::{Launch, Overrides, builtin_files, builtin_text, open, parse
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex};
 use std::thread::{available_parallelism, scope};
 
 /// UAVs of the small scenarios.
@@ -141,19 +141,21 @@ fn kept() -> Vec<Kept> {
     files.into_iter().flat_map(of_file).collect()
 }
 
-/// Works on each, by all processors.
-fn by_all_processors<T: Sync>(all: &[T], work: impl Fn(&T) + Sync) {
-    let next = AtomicUsize::new(0);
+/// What comes of each, by all processors, in no certain order.
+fn by_all_processors<T: Sync, R: Send>(all: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let workers = available_parallelism().map_or(1, usize::from);
     scope(|scope| {
         for _ in 0..workers {
             scope.spawn(|| {
                 while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    work(one);
+                    let of_one = work(one);
+                    done.lock().unwrap().push(of_one);
                 }
             });
         }
     });
+    done.into_inner().unwrap()
 }
 
 /// Flown by all processors: it is the last test of its binary, and the longest.
@@ -162,30 +164,21 @@ fn seeds_that_once_failed_hold() {
     let kept = kept();
     assert!(!kept.is_empty(), "no seed is kept");
     // All places first: lines of one stand beside each other, and would wait for each other.
-    let places: BTreeMap<String, (&Kept, OnceLock<Flown>)> = kept
-        .iter()
-        .map(|k| (k.place(), (k, OnceLock::new())))
-        .collect();
-    let unprepared: Vec<_> = places.values().collect();
-    by_all_processors(&unprepared, |(kept, place)| {
-        place.get_or_init(|| {
-            let prepared = prepared(&kept.scenario, kept.launch, kept.uavs);
-            let free_ms = runs::failure_free_makespan_ms(&prepared);
-            (prepared, free_ms)
-        });
+    let unprepared: BTreeMap<String, &Kept> = kept.iter().map(|k| (k.place(), k)).collect();
+    let unprepared: Vec<(String, &Kept)> = unprepared.into_iter().collect();
+    let places = by_all_processors(&unprepared, |(place, kept)| {
+        let prepared = prepared(&kept.scenario, kept.launch, kept.uavs);
+        let free_ms = runs::failure_free_makespan_ms(&prepared);
+        (place.clone(), (prepared, free_ms))
     });
-    let place = |kept: &Kept| places[&kept.place()].1.get().unwrap();
-    let failed = Mutex::new(Vec::new());
-    by_all_processors(&kept, |kept| {
-        let broken = kept.failure(&kept.fly(place(kept)));
-        failed.lock().unwrap().extend(broken);
-    });
-    let mut failed = failed.into_inner().unwrap();
+    let places: BTreeMap<String, Flown> = places.into_iter().collect();
+    let broken = by_all_processors(&kept, |k| k.failure(&k.fly(&places[&k.place()])));
+    let mut failed: Vec<String> = broken.into_iter().flatten().collect();
     failed.sort();
     assert!(failed.is_empty(), "{}", failed.join("\n"));
     // Once is enough to see that a run repeats itself.
     let first = &kept[0];
-    let again = [(); 2].map(|()| first.fly(place(first)));
+    let again = [(); 2].map(|()| first.fly(&places[&first.place()]));
     assert_eq!(
         again[0].history_hash, again[1].history_hash,
         "{}",
