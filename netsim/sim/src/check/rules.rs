@@ -213,6 +213,12 @@ impl Rules {
                 self.patience.on_told(now_ms, id, (adoptions, *counter));
             }
             Report::Covered { cells } => self.decision.on_covered(id, cells.len()),
+            Report::Task {
+                id: task,
+                revision,
+                news,
+                ..
+            } => self.tasks.on_report(id, (*task, *revision), news),
             Report::Ready { loop_hash, .. } => {
                 let before = self.loops.insert(id, *loop_hash);
                 self.on_loop_of(id, before, *loop_hash);

@@ -3,7 +3,8 @@
 //! (`task-lost`).
 
 use super::{Clocks, Findings, Grade, PeerSnapshot, Snapshot};
-use skein_peer::wire::tasks::{Progress, TaskId};
+use skein_peer::output::TaskNews;
+use skein_peer::wire::tasks::{Progress, TaskId, TaskState};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A single case may take so many bounds, since bundles collide like all else.
@@ -20,18 +21,31 @@ type Asked = (TaskId, u32);
 pub struct TaskCheck {
     twice: Clocks<(u16, u16, Asked)>,
     lost: Clocks<(u16, Asked)>,
-    /// What somebody said to have done, who may be dead by now: those who heard it need no
-    /// other, though the word of who asked for it does not reach them.
-    done: BTreeSet<Asked>,
+    /// What somebody said to have done, who may be dead by now, and whose time was over for
+    /// somebody: those who heard of it need nobody, though the word of who asked for it does not
+    /// reach them.
+    over: BTreeSet<Asked>,
 }
 
 impl TaskCheck {
+    /// A peer tells its people of a task. Its time is over for each peer so long after that heard
+    /// of it, so for nobody before it is in truth.
+    pub fn on_report(&mut self, peer: u16, task: (TaskId, u32), news: &TaskNews) {
+        if *news == TaskNews::Over(TaskState::Expired) {
+            let (id, revision) = task;
+            self.over.insert(task);
+            // Who asked for it says so in the next revision.
+            let asked = revision.saturating_sub(u32::from(id.author == peer));
+            self.over.insert((id, asked));
+        }
+    }
+
     /// Looks at all components.
     pub fn on_snapshot(&mut self, snapshot: &Snapshot<'_>, found: &mut Findings) {
         let (mut twice, mut lost) = (BTreeSet::new(), BTreeSet::new());
         let all = snapshot.peers.iter().flat_map(|m| &m.view.tasks);
         let done = all.filter(|(.., progress)| *progress == Progress::Done);
-        self.done
+        self.over
             .extend(done.map(|(id, revision, _)| (*id, *revision)));
         for members in snapshot.graph.components() {
             let peers = snapshot.speaking_uavs(&members);
@@ -101,7 +115,7 @@ impl TaskCheck {
             .collect();
         let bound_ms = WAYS * snapshot.bounds.spread_ms();
         for m in able {
-            let nobodys = |t: &&Asked| !held.contains(t) && !self.done.contains(t);
+            let nobodys = |t: &&Asked| !held.contains(t) && !self.over.contains(t);
             for task in m.view.open_tasks.iter().filter(nobodys) {
                 let key = (m.id, *task);
                 seen.insert(key);
@@ -182,6 +196,24 @@ mod tests {
             story.snapshot(t * 1000, views, |s| check.on_snapshot(s, &mut found));
         }
         assert!(found.counts.is_empty(), "{:?}", found.violations);
+        // Its time was over for somebody who heard of it sooner, or for who asked for it.
+        let expired = TaskNews::Over(TaskState::Expired);
+        let cancelled = TaskNews::Over(TaskState::Cancelled);
+        for (by, revision, news, demanded) in [
+            (2, 1, &expired, false),
+            (100, 2, &expired, false),
+            (2, 2, &expired, true),
+            (100, 2, &cancelled, true),
+        ] {
+            let (mut story, mut found) = (Story::new(0), Findings::new(1));
+            let mut check = TaskCheck::default();
+            check.on_report(by, (TASK, revision), news);
+            for t in 0..100 {
+                let views = [(1, holding(None)), (2, speaking())];
+                story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
+            }
+            assert_eq!(found.counts.contains_key("task-lost"), demanded, "{news:?}");
+        }
         let cannot = Beliefs {
             able: false,
             ..holding(None)

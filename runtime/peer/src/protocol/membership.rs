@@ -46,6 +46,7 @@ use crate::wire::limits::INTERVAL_LEAST;
 use crate::wire::limits::{HOPS_MAX, PEERS_MAX};
 use crate::wire::message::{Beacon, Fresh, Gossip, OffLoop};
 use core::cell::Cell;
+use core::cmp::Reverse;
 use extent::{Extent, Patience, window_ms};
 use known::{Age, HeardHeartbeat, Known, Weight};
 use questions::{Questions, urgency};
@@ -61,6 +62,10 @@ const URGENT_INTERVALS: u64 = 6;
 
 /// Whoever knows a later heartbeat of somebody says so at once, once in so many intervals.
 const ANSWER_INTERVALS: u64 = 2;
+
+/// With what is said at once so many others go at most that were said before: four heartbeats of
+/// others are as long as half of the headers of a transmission.
+const BESIDE_MAX: usize = 4;
 
 /// A belief that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -561,7 +566,9 @@ impl Membership {
         }
         let verdict_ms = limits.verdict_ms(ms_of(told.interval, self.period_ms));
         let is_question = urgency(told, &limits, verdict_ms, now) > 0;
-        self.questions.hear(told, is_question);
+        let distance = self.known.get(&told.id);
+        let distance = distance.map_or(0, |k| k.distance(now, limits.interval_ms));
+        self.questions.hear(told, is_question, distance);
         let again_ms = ANSWER_INTERVALS * self.own_interval_ms();
         if is_question
             && let Some(known) = self.known.get_mut(&told.id)
@@ -582,36 +589,62 @@ impl Membership {
         self.questions.next()
     }
 
-    /// What is to be said at once: heartbeats that are asked for, and those that answer.
+    /// What is to be said at once: heartbeats that are asked for, and those that answer. With them
+    /// go answers that nobody was heard passing on, and what is still asked for, as many of them:
+    /// where transmissions are lost, each that arrives brings all that is waited for.
     pub fn tell_at_once(&mut self, now: Time, max: usize) -> Vec<Fresh> {
-        let (interval_ms, own_ms) = (self.interval_ms(), self.own_interval_ms());
-        let mut said = Vec::new();
+        let own_ms = self.own_interval_ms();
+        let mut said = BTreeSet::new();
         for (id, waiting) in self.questions.take(now, max) {
-            let Some(known) = self.known.get_mut(&id) else {
-                continue;
-            };
-            let suspected = known.freshest.suspected.is_some();
-            let holds = if waiting.answers {
-                known.freshest.count > waiting.count && known.status == Status::Alive
-            } else {
-                known.freshest.count == waiting.count && known.status != Status::Down
-            };
+            let holds = self.known.get(&id).is_some_and(|k| waiting.holds(k));
             if !holds {
                 continue;
             }
-            if waiting.answers {
+            if waiting.answers
+                && let Some(known) = self.known.get_mut(&id)
+            {
                 known.answered_at = now;
                 let again_at = now.plus_ms(own_ms);
                 let count = known.freshest.count;
                 self.questions.said(id, waiting, count, again_at);
             }
-            known.tell(now);
-            if suspected {
-                known.tell_news(now, own_ms);
-            }
-            said.push(known.fresh(now, interval_ms));
+            said.insert(id);
         }
-        said
+        if !said.is_empty() {
+            self.say_beside(now, &mut said, max);
+        }
+        let say = |id| self.say_one_at_once(now, id);
+        said.into_iter().filter_map(say).collect()
+    }
+
+    /// Adds to those of whom something is said at once some who go with them.
+    fn say_beside(&mut self, now: Time, said: &mut BTreeSet<u16>, max: usize) {
+        let most = max.min(said.len() + BESIDE_MAX);
+        let patience = self.patience(now);
+        let again = self.questions.answered();
+        let again = again.filter(|(id, w)| self.known.get(id).is_some_and(|k| w.holds(k)));
+        let again = again.map(|(id, _)| id);
+        let asked = self.known.iter().filter(|(_, k)| k.asked > 0);
+        let mut asked: Vec<(u8, u16)> = asked
+            .map(|(id, k)| (k.urgency(now, &patience, self.period_ms), *id))
+            .filter(|(urgency, _)| *urgency > 0)
+            .collect();
+        asked.sort_by_key(|(urgency, id)| (Reverse(*urgency), *id));
+        for id in again.chain(asked.into_iter().map(|(_, id)| id)) {
+            if said.len() < most {
+                said.insert(id);
+            }
+        }
+    }
+
+    fn say_one_at_once(&mut self, now: Time, id: u16) -> Option<Fresh> {
+        let (interval_ms, own_ms) = (self.interval_ms(), self.own_interval_ms());
+        let known = self.known.get_mut(&id)?;
+        known.tell(now);
+        if known.freshest.suspected.is_some() {
+            known.tell_news(now, own_ms);
+        }
+        Some(known.fresh(now, interval_ms))
     }
 
     /// Does something to what is known of one peer, and notes what the extent and the number
@@ -695,9 +728,7 @@ impl Membership {
             known.info = Info::default();
             known.eccentricity = 0;
         }
-        let verdict_ms = limits.verdict_ms(ms_of(known.freshest.interval, self.period_ms));
-        let was_asked =
-            known.status != Status::Down && urgency(&known.freshest, &limits, verdict_ms, now) > 0;
+        let was_asked = known.urgency(now, &limits, self.period_ms) > 0;
         let passes_on = is_far && was_asked && heard.suspected.is_none() && !new_life;
         let before = known.freshest;
         if known.status == Status::Down {

@@ -491,14 +491,19 @@ impl Known {
 
     /// Whether a later heartbeat is to be asked for at once, more urgently than before.
     pub(super) fn asks_at_once(&mut self, now: Time, patience: &Patience, period_ms: u64) -> bool {
-        if self.status == Status::Down {
-            return false;
-        }
-        let verdict_ms = patience.verdict_ms(ms_of(self.freshest.interval, period_ms));
-        let urgency = urgency(&self.freshest, patience, verdict_ms, now);
+        let urgency = self.urgency(now, patience, period_ms);
         let asks = urgency > self.asked;
         self.asked = self.asked.max(urgency);
         asks
+    }
+
+    /// How urgent it is to hear of it: 0 while gossip has time, and of who is down.
+    pub(super) fn urgency(&self, now: Time, patience: &Patience, period_ms: u64) -> u8 {
+        if self.status == Status::Down {
+            return 0;
+        }
+        let verdict_ms = patience.verdict_ms(ms_of(self.freshest.interval, period_ms));
+        urgency(&self.freshest, patience, verdict_ms, now)
     }
 
     /// Whether somebody asks for a later heartbeat than this, and one is known here.
@@ -546,7 +551,7 @@ impl Known {
 
     /// The fewest hops by which it was heard of lately: the freshest heartbeat may have come
     /// by a longer way.
-    fn distance(&self, now: Time, interval_ms: u64) -> u8 {
+    pub(super) fn distance(&self, now: Time, interval_ms: u64) -> u8 {
         let lately_ms = NEAR_INTERVALS * interval_ms;
         let lately = self
             .hops

@@ -2,8 +2,9 @@
 //! take an interval a hop.
 
 use super::extent::Patience;
-use super::known::HeardHeartbeat;
+use super::known::{HeardHeartbeat, Known};
 use crate::input::Time;
+use crate::output::Status;
 use std::collections::BTreeMap;
 
 /// A later heartbeat of who is suspected is asked for after each sixth of the time to refute that,
@@ -45,6 +46,16 @@ struct Again {
 }
 
 impl Waiting {
+    /// Whether it is still to be said of who is known so.
+    pub(super) fn holds(&self, known: &Known) -> bool {
+        let count = known.freshest.count;
+        if self.answers {
+            count > self.count && known.status == Status::Alive
+        } else {
+            count == self.count && known.status != Status::Down
+        }
+    }
+
     fn is_due(&self, now: Time) -> bool {
         self.again.is_none_or(|again| again.at <= now)
     }
@@ -96,11 +107,23 @@ impl Questions {
         }
     }
 
-    /// A neighbour tells of somebody: whether that is what this peer was to say.
-    pub(super) fn hear(&mut self, told: &HeardHeartbeat, is_question: bool) {
+    /// A neighbour tells of somebody who is so many hops from here: whether that is what this peer
+    /// was to say. Not if who hears that one is on the other side: a question goes towards the
+    /// one asked for, and counts as said by who is as near; an answer goes away from there, and
+    /// counts as said by who is as far.
+    pub(super) fn hear(&mut self, told: &HeardHeartbeat, is_question: bool, hops: u8) {
         let Some(waiting) = self.waiting.get_mut(&told.id) else {
             return;
         };
+        let teller_hops = told.hops.saturating_sub(1);
+        let is_elsewhere = if waiting.answers {
+            teller_hops < hops
+        } else {
+            teller_hops > hops
+        };
+        if is_elsewhere {
+            return;
+        }
         if let Some(again) = waiting.again {
             // What others tell of it anyway is no sign that the answer was heard.
             if told.count == again.count && told.suspected.is_none() {
@@ -132,6 +155,12 @@ impl Questions {
         let taken = due.into_iter();
         let taken = taken.filter_map(|id| Some((id, self.waiting.remove(&id)?)));
         taken.collect()
+    }
+
+    /// The answers that were said, and that nobody was heard passing on yet.
+    pub(super) fn answered(&self) -> impl Iterator<Item = (u16, Waiting)> + '_ {
+        let answered = self.waiting.iter().filter(|(_, w)| w.again.is_some());
+        answered.map(|(id, waiting)| (*id, *waiting))
     }
 
     /// An answer was said, with this count. If nobody else is heard saying so it is said again

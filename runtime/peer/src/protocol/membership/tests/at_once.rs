@@ -106,6 +106,114 @@ fn an_answer_heard_once_before_it_is_said_is_not_said_again() {
     assert_eq!(m.question_at(), None);
 }
 
+/// A question goes towards the one asked for, and an answer away from there: who says the same on
+/// the other side is not heard by those who wait for this peer's word.
+#[test]
+fn what_is_said_by_those_who_are_elsewhere_is_said_all_the_same() {
+    // 30 is two hops from here.
+    let told = |heartbeat, suspected_ds, hops| {
+        let fresh = asked(heartbeat, suspected_ds)[0];
+        vec![Fresh { hops, ..fresh }]
+    };
+    for (hops, waits) in [(1, false), (2, false), (3, true)] {
+        let mut m = among_many_far_apart();
+        m.on_others(Time(3_000), 3, &asked(5, Some(20)));
+        assert!(m.take_question());
+        m.on_others(Time(3_050), 5, &told(5, Some(20), hops));
+        m.on_others(Time(3_060), 6, &told(5, Some(20), hops));
+        assert_eq!(m.question_at().is_some(), waits, "asked by {hops} hops");
+    }
+    for (hops, waits) in [(1, true), (2, false), (3, false)] {
+        let mut m = asked_by_3();
+        m.on_others(Time(3_050), 5, &told(5, None, hops));
+        m.on_others(Time(3_060), 6, &told(5, None, hops));
+        assert_eq!(m.question_at().is_some(), waits, "answered by {hops} hops");
+        let mut m = asked_by_3();
+        assert_eq!(at_once(&mut m, Time(3_100)), [(30, 5, false)]);
+        m.on_others(Time(3_200), 5, &told(5, None, hops));
+        assert_eq!(
+            m.question_at().is_some(),
+            waits,
+            "said again by {hops} hops"
+        );
+    }
+}
+
+/// Each transmission that arrives brings all that is waited for; none is sent for that alone.
+#[test]
+fn with_what_is_said_at_once_goes_what_was_said_and_is_waited_for() {
+    let mut m = asked_by_3();
+    assert_eq!(at_once(&mut m, Time(3_100)), [(30, 5, false)]);
+    // Of 31 a later heartbeat is asked for; 30 was answered for, and nobody passed that on.
+    let of_31 = Fresh {
+        id: 31,
+        ..asked(5, Some(20))[0]
+    };
+    m.on_others(Time(3_200), 3, &[of_31]);
+    assert_eq!(
+        at_once(&mut m, Time(3_300)),
+        [(30, 5, false), (31, 5, true)]
+    );
+    // The answer is due all the same when it was to be said again, and what was asked goes along.
+    assert!(at_once(&mut m, Time(4_099)).is_empty());
+    assert_eq!(
+        at_once(&mut m, Time(4_100)),
+        [(30, 5, false), (31, 5, true)]
+    );
+}
+
+/// The answer tells a heartbeat that is old itself, so that a later one is asked for.
+#[test]
+fn who_is_answered_for_and_asked_for_is_told_of_once() {
+    let mut m = among_many_far_apart();
+    for t in 3..=11 {
+        let said = Beacon {
+            eccentricity: 2,
+            ..beacon(100 + t as u32, Vec::new())
+        };
+        for id in 2..=20 {
+            m.on_beacon(Time(t * 1_000), id, 1, &said);
+        }
+    }
+    m.tick(Time(11_000));
+    assert_eq!(
+        at_once(&mut m, Time(11_050)),
+        [(30, 5, false)],
+        "is asked for"
+    );
+    m.on_others(Time(11_100), 3, &asked(4, Some(20)));
+    assert_eq!(
+        at_once(&mut m, Time(11_150)),
+        [(30, 5, false)],
+        "is answered for"
+    );
+    let of_31 = Fresh {
+        id: 31,
+        ..asked(5, Some(20))[0]
+    };
+    m.on_others(Time(11_200), 3, &[of_31]);
+    let told = at_once(&mut m, Time(11_250));
+    assert_eq!(told, [(30, 5, false), (31, 5, true)]);
+}
+
+#[test]
+fn of_those_who_are_asked_for_the_four_most_urgent_go_with_what_is_said_at_once() {
+    let of = |(id, suspected_ds)| Fresh {
+        id,
+        ..asked(5, Some(suspected_ds))[0]
+    };
+    let ids = |m: &mut Membership, now| -> Vec<u16> {
+        at_once(m, now).iter().map(|said| said.0).collect()
+    };
+    let mut m = among_many_far_apart();
+    let suspected = (31..).zip([45, 20, 22, 28, 34, 40]);
+    let others: Vec<Fresh> = suspected.map(of).collect();
+    m.on_others(Time(3_000), 3, &others);
+    assert_eq!(ids(&mut m, Time(3_050)), [31, 32, 33, 34, 35, 36]);
+    m.on_others(Time(3_100), 3, &[of((38, 20))]);
+    assert_eq!(ids(&mut m, Time(3_150)), [31, 34, 35, 36, 38]);
+}
+
 #[test]
 fn an_answer_is_passed_on_by_who_asked_and_tells_nothing_of_how_far_somebody_is() {
     let mut m = among_many_far_apart();
