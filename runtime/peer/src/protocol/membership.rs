@@ -27,6 +27,7 @@
 //! a merging component cannot raise the dead. What follows from a verdict is left to
 //! the callers; here it revokes nothing.
 
+mod at_once;
 mod extent;
 mod known;
 #[cfg(test)]
@@ -46,10 +47,9 @@ use crate::wire::limits::INTERVAL_LEAST;
 use crate::wire::limits::{HOPS_MAX, PEERS_MAX};
 use crate::wire::message::{Beacon, Fresh, Gossip, OffLoop};
 use core::cell::Cell;
-use core::cmp::Reverse;
 use extent::{Extent, Patience, window_ms};
 use known::{Age, HeardHeartbeat, Known, Weight};
-use questions::{Questions, urgency};
+use questions::Questions;
 use std::collections::{BTreeMap, BTreeSet};
 use telling::{Moment, Telling};
 
@@ -59,13 +59,6 @@ pub const MAX_KNOWN: usize = PEERS_MAX - 1;
 
 /// What was not told of within so many intervals is no news any more.
 const URGENT_INTERVALS: u64 = 6;
-
-/// Whoever knows a later heartbeat of somebody says so at once, once in so many intervals.
-const ANSWER_INTERVALS: u64 = 2;
-
-/// With what is said at once so many others go at most that were said before: four heartbeats of
-/// others are as long as half of the headers of a transmission.
-const BESIDE_MAX: usize = 4;
 
 /// A belief that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -556,95 +549,6 @@ impl Membership {
         {
             self.questions.ask(heartbeat.id, known.freshest.count);
         }
-    }
-
-    /// Somebody asks for a heartbeat later than one that is known here, or says what this peer
-    /// was to say.
-    fn hear_question(&mut self, now: Time, told: &HeardHeartbeat, limits: Patience) {
-        if !self.is_far(now) {
-            return;
-        }
-        let verdict_ms = limits.verdict_ms(ms_of(told.interval, self.period_ms));
-        let is_question = urgency(told, &limits, verdict_ms, now) > 0;
-        let distance = self.known.get(&told.id);
-        let distance = distance.map_or(0, |k| k.distance(now, limits.interval_ms));
-        self.questions.hear(told, is_question, distance);
-        let again_ms = ANSWER_INTERVALS * self.own_interval_ms();
-        if is_question
-            && let Some(known) = self.known.get_mut(&told.id)
-            && known.answers(now, told, again_ms)
-        {
-            self.questions.answer(told.id, told.count);
-        }
-    }
-
-    /// Whether something is to be said at once that was not when this was last asked.
-    pub fn take_question(&mut self) -> bool {
-        self.questions.take_new()
-    }
-
-    /// When something is to be said at once, the past if now, unless nothing is.
-    #[must_use]
-    pub fn question_at(&self) -> Option<Time> {
-        self.questions.next()
-    }
-
-    /// What is to be said at once: heartbeats that are asked for, and those that answer. With them
-    /// go answers that nobody was heard passing on, and what is still asked for, as many of them:
-    /// where transmissions are lost, each that arrives brings all that is waited for.
-    pub fn tell_at_once(&mut self, now: Time, max: usize) -> Vec<Fresh> {
-        let own_ms = self.own_interval_ms();
-        let mut said = BTreeSet::new();
-        for (id, waiting) in self.questions.take(now, max) {
-            let holds = self.known.get(&id).is_some_and(|k| waiting.holds(k));
-            if !holds {
-                continue;
-            }
-            if waiting.answers
-                && let Some(known) = self.known.get_mut(&id)
-            {
-                known.answered_at = now;
-                let again_at = now.plus_ms(own_ms);
-                let count = known.freshest.count;
-                self.questions.said(id, waiting, count, again_at);
-            }
-            said.insert(id);
-        }
-        if !said.is_empty() {
-            self.say_beside(now, &mut said, max);
-        }
-        let say = |id| self.say_one_at_once(now, id);
-        said.into_iter().filter_map(say).collect()
-    }
-
-    /// Adds to those of whom something is said at once some who go with them.
-    fn say_beside(&mut self, now: Time, said: &mut BTreeSet<u16>, max: usize) {
-        let most = max.min(said.len() + BESIDE_MAX);
-        let patience = self.patience(now);
-        let again = self.questions.answered();
-        let again = again.filter(|(id, w)| self.known.get(id).is_some_and(|k| w.holds(k)));
-        let again = again.map(|(id, _)| id);
-        let asked = self.known.iter().filter(|(_, k)| k.asked > 0);
-        let mut asked: Vec<(u8, u16)> = asked
-            .map(|(id, k)| (k.urgency(now, &patience, self.period_ms), *id))
-            .filter(|(urgency, _)| *urgency > 0)
-            .collect();
-        asked.sort_by_key(|(urgency, id)| (Reverse(*urgency), *id));
-        for id in again.chain(asked.into_iter().map(|(_, id)| id)) {
-            if said.len() < most {
-                said.insert(id);
-            }
-        }
-    }
-
-    fn say_one_at_once(&mut self, now: Time, id: u16) -> Option<Fresh> {
-        let (interval_ms, own_ms) = (self.interval_ms(), self.own_interval_ms());
-        let known = self.known.get_mut(&id)?;
-        known.tell(now);
-        if known.freshest.suspected.is_some() {
-            known.tell_news(now, own_ms);
-        }
-        Some(known.fresh(now, interval_ms))
     }
 
     /// Does something to what is known of one peer, and notes what the extent and the number
