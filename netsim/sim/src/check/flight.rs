@@ -54,8 +54,9 @@ struct Homing {
 #[derive(Clone, Copy, Debug)]
 struct Holding {
     since_ms: u64,
-    /// On which loop: with another one a flight is begun anew, and another circle with it.
-    loop_hash: u64,
+    /// On which loop, by which revision of the mission: with another one a flight is begun anew,
+    /// and another circle with it; a new zone may lie where that was, off the loop.
+    mission: (u64, u32),
     /// Where it was once it had settled.
     place: Option<Point>,
     /// For how long it was looked at since.
@@ -222,15 +223,15 @@ impl FlightCheck {
         flyer: Flyer,
         found: &mut Findings,
     ) {
-        let (id, loop_hash) = (m.id, m.view.loop_hash);
+        let (id, mission) = (m.id, (m.view.loop_hash, m.view.revision));
         let fresh = Holding {
             since_ms: now_ms,
-            loop_hash,
+            mission,
             place: None,
             for_ms: 0,
         };
         let holding = self.holding.entry(id).or_insert(fresh);
-        if holding.loop_hash != loop_hash {
+        if holding.mission != mission {
             *holding = fresh;
         }
         let settle_s = SETTLE_TURNS * core::f64::consts::TAU * flyer.turn_radius_m
@@ -303,8 +304,9 @@ mod tests {
         for t in 0..200 {
             let mut view = speaking();
             change(&mut view);
-            // Another mission comes.
+            // Another mission comes, and a zone of it off the loop.
             view.loop_hash += u64::from(t >= 100);
+            view.revision = if t < 60 { 1 } else { 2 };
             story.place(1, Point::new(away_m(t), 0.0));
             let views = [(1, view)];
             story.snapshot(t * 1000, &views, |s| {
@@ -381,10 +383,12 @@ mod tests {
         let flies_on = |t: u64| 10.0 * f64::from(u8::try_from(t).unwrap());
         assert!(flown(hold, flies_on).contains_key("hold"));
         assert!(flown(|_| {}, flies_on).is_empty());
-        // A mission on another loop may come with another circle, and with one only.
+        // Another mission may come with another circle, and with one only.
         let moves_at = |s: u64| move |t: u64| if t < s { 500.0 } else { 605.0 };
         assert!(flown(hold, moves_at(100)).is_empty());
-        assert!(flown(hold, moves_at(80)).contains_key("hold"));
+        assert!(flown(hold, moves_at(60)).is_empty());
+        assert!(flown(hold, moves_at(50)).contains_key("hold"));
+        assert!(flown(hold, moves_at(90)).contains_key("hold"));
         assert!(flown(hold, moves_at(140)).contains_key("hold"));
     }
 }
