@@ -243,6 +243,16 @@ impl Gathering {
         own.sector.verdict = own.sector.verdict.max(verdict);
     }
 
+    /// The first tile from this one on of which anything is known.
+    fn tile_from(&self, of: u32, tile: u16) -> Option<u16> {
+        let first = tile.checked_mul(SECTORS_EACH)?;
+        let known = self.known.range((of, first)..=(of, u16::MAX)).next();
+        let known = known.map(|((_, sector), _)| *sector);
+        let own = self.own.range(first..).next().map(|(sector, _)| *sector);
+        let next = known.into_iter().chain(own).min()?;
+        Some(next / SECTORS_EACH)
+    }
+
     /// What of an own tile is news beside what anybody told.
     fn news_of(&self, tile: u16, (of, interval_ms): (u32, u64)) -> News {
         let first = SECTORS_EACH * tile;
@@ -291,14 +301,10 @@ impl Gathering {
         let newer_ms = if looks { interval_ms } else { LAST_MS };
         let again_ms = AGAIN * interval_ms + RANK_INTERVALS * beacon_ms * rank;
         let is_turn = now.since_ms(self.said_at) >= TURN_INTERVALS * beacon_ms * uavs;
-        let known = self.known.range((of, 0)..=(of, u16::MAX));
-        let known = known.map(|((_, s), _)| s / SECTORS_EACH);
-        let own = self.own.keys().map(|s| s / SECTORS_EACH);
-        let mut tiles: Vec<u16> = known.chain(own).collect();
-        tiles.sort_unstable();
-        tiles.dedup();
         let mut due: Option<((bool, u64), u16, bool)> = None;
-        for tile in tiles {
+        let mut from = 0;
+        while let Some(tile) = self.tile_from(of, from) {
+            from = tile + 1;
             let (mut news, mut since_ms) = (self.news_of(tile, (of, newer_ms)), 0);
             let is_new = news == News::Urgent;
             if news == News::None {
