@@ -388,7 +388,7 @@ mod tests {
         assert!(flown(hold, moves_at(100)).is_empty());
         assert!(flown(hold, moves_at(60)).is_empty());
         assert!(flown(hold, moves_at(50)).contains_key("hold"));
-        assert!(flown(hold, moves_at(90)).contains_key("hold"));
+        assert!(flown(hold, moves_at(80)).contains_key("hold"));
         assert!(flown(hold, moves_at(140)).contains_key("hold"));
     }
 }

@@ -29,7 +29,7 @@ pub struct TaskCheck {
 
 impl TaskCheck {
     /// A peer tells its people of a task. Its time is over for each peer so long after that heard
-    /// of it, so for nobody before it is in truth.
+    /// of it: for nobody before it is in truth, unless a clock jumped.
     pub fn on_report(&mut self, peer: u16, task: (TaskId, u32), news: &TaskNews) {
         if *news == TaskNews::Over(TaskState::Expired) {
             let (id, revision) = task;

@@ -25,9 +25,9 @@ impl Membership {
         }
         let verdict_ms = limits.verdict_ms(ms_of(told.interval, self.period_ms));
         let is_question = urgency(told, &limits, verdict_ms, now) > 0;
-        let distance = self.known.get(&told.id);
-        let distance = distance.map_or(0, |k| k.distance(now, limits.interval_ms));
-        self.questions.hear(told, is_question, distance);
+        let known = self.known.get(&told.id);
+        let hops = || known.map_or(0, |k| k.distance(now, limits.interval_ms));
+        self.questions.hear(told, is_question, hops);
         let again_ms = ANSWER_INTERVALS * self.own_interval_ms();
         if is_question
             && let Some(known) = self.known.get_mut(&told.id)
@@ -52,19 +52,16 @@ impl Membership {
     /// go answers that nobody was heard passing on, and what is still asked for, as many of them:
     /// where transmissions are lost, each that arrives brings all that is waited for.
     pub fn tell_at_once(&mut self, now: Time, max: usize) -> Vec<Fresh> {
-        let own_ms = self.own_interval_ms();
+        let (interval_ms, own_ms) = (self.interval_ms(), self.own_interval_ms());
         let mut said = BTreeSet::new();
         for (id, waiting) in self.questions.take(now, max) {
-            let holds = self.known.get(&id).is_some_and(|k| waiting.holds(k));
-            if !holds {
+            let known = self.known.get_mut(&id);
+            let Some(known) = known.filter(|k| waiting.holds(k)) else {
                 continue;
-            }
-            if waiting.answers
-                && let Some(known) = self.known.get_mut(&id)
-            {
+            };
+            if waiting.answers {
                 known.answered_at = now;
-                let again_at = now.plus_ms(own_ms);
-                let count = known.freshest.count;
+                let (count, again_at) = (known.freshest.count, now.plus_ms(own_ms));
                 self.questions.said(id, waiting, count, again_at);
             }
             said.insert(id);
@@ -72,7 +69,14 @@ impl Membership {
         if !said.is_empty() {
             self.say_beside(now, &mut said, max);
         }
-        let say = |id| self.say_one_at_once(now, id);
+        let say = |id| {
+            let known = self.known.get_mut(&id)?;
+            known.tell(now);
+            if known.freshest.suspected.is_some() {
+                known.tell_news(now, own_ms);
+            }
+            Some(known.fresh(now, interval_ms))
+        };
         said.into_iter().filter_map(say).collect()
     }
 
@@ -94,15 +98,5 @@ impl Membership {
                 said.insert(id);
             }
         }
-    }
-
-    fn say_one_at_once(&mut self, now: Time, id: u16) -> Option<Fresh> {
-        let (interval_ms, own_ms) = (self.interval_ms(), self.own_interval_ms());
-        let known = self.known.get_mut(&id)?;
-        known.tell(now);
-        if known.freshest.suspected.is_some() {
-            known.tell_news(now, own_ms);
-        }
-        Some(known.fresh(now, interval_ms))
     }
 }

@@ -111,11 +111,16 @@ impl Questions {
     /// was to say. Not if who hears that one is on the other side: a question goes towards the
     /// one asked for, and counts as said by who is as near; an answer goes away from there, and
     /// counts as said by who is as far.
-    pub(super) fn hear(&mut self, told: &HeardHeartbeat, is_question: bool, hops: u8) {
+    pub(super) fn hear(
+        &mut self,
+        told: &HeardHeartbeat,
+        is_question: bool,
+        hops: impl FnOnce() -> u8,
+    ) {
         let Some(waiting) = self.waiting.get_mut(&told.id) else {
             return;
         };
-        let teller_hops = told.hops.saturating_sub(1);
+        let (teller_hops, hops) = (told.hops.saturating_sub(1), hops());
         let is_elsewhere = if waiting.answers {
             teller_hops < hops
         } else {

@@ -29,6 +29,14 @@ fn asked(heartbeat: u32, suspected_ds: Option<u16>) -> Vec<Fresh> {
     vec![fresh]
 }
 
+/// The same of another.
+fn asked_of(id: u16, suspected_ds: u16) -> Fresh {
+    Fresh {
+        id,
+        ..asked(5, Some(suspected_ds))[0]
+    }
+}
+
 /// Peer 3 asks for a heartbeat of 30 later than one that is older than what is known here.
 fn asked_by_3() -> Membership {
     let mut m = among_many_far_apart();
@@ -145,11 +153,7 @@ fn with_what_is_said_at_once_goes_what_was_said_and_is_waited_for() {
     let mut m = asked_by_3();
     assert_eq!(at_once(&mut m, Time(3_100)), [(30, 5, false)]);
     // Of 31 a later heartbeat is asked for; 30 was answered for, and nobody passed that on.
-    let of_31 = Fresh {
-        id: 31,
-        ..asked(5, Some(20))[0]
-    };
-    m.on_others(Time(3_200), 3, &[of_31]);
+    m.on_others(Time(3_200), 3, &[asked_of(31, 20)]);
     assert_eq!(
         at_once(&mut m, Time(3_300)),
         [(30, 5, false), (31, 5, true)]
@@ -187,30 +191,22 @@ fn who_is_answered_for_and_asked_for_is_told_of_once() {
         [(30, 5, false)],
         "is answered for"
     );
-    let of_31 = Fresh {
-        id: 31,
-        ..asked(5, Some(20))[0]
-    };
-    m.on_others(Time(11_200), 3, &[of_31]);
+    m.on_others(Time(11_200), 3, &[asked_of(31, 20)]);
     let told = at_once(&mut m, Time(11_250));
     assert_eq!(told, [(30, 5, false), (31, 5, true)]);
 }
 
 #[test]
 fn of_those_who_are_asked_for_the_four_most_urgent_go_with_what_is_said_at_once() {
-    let of = |(id, suspected_ds)| Fresh {
-        id,
-        ..asked(5, Some(suspected_ds))[0]
-    };
     let ids = |m: &mut Membership, now| -> Vec<u16> {
         at_once(m, now).iter().map(|said| said.0).collect()
     };
     let mut m = among_many_far_apart();
     let suspected = (31..).zip([45, 20, 22, 28, 34, 40]);
-    let others: Vec<Fresh> = suspected.map(of).collect();
+    let others: Vec<Fresh> = suspected.map(|(id, ds)| asked_of(id, ds)).collect();
     m.on_others(Time(3_000), 3, &others);
     assert_eq!(ids(&mut m, Time(3_050)), [31, 32, 33, 34, 35, 36]);
-    m.on_others(Time(3_100), 3, &[of((38, 20))]);
+    m.on_others(Time(3_100), 3, &[asked_of(38, 20)]);
     assert_eq!(ids(&mut m, Time(3_150)), [31, 34, 35, 36, 38]);
 }
 
