@@ -129,8 +129,10 @@ impl Library {
         pieces.insert(index, chunk.clone());
         self.latest = Some(key);
         if pieces.len() < usize::from(chunk.chunks) {
-            if let Some(mission) = self.filled(key, index) {
-                self.offer(Arc::new(mission));
+            // A piece that is as before completes nothing that the one before it did not.
+            let is_new = !self.is_as_before(key, index);
+            if let Some(mission) = is_new.then(|| self.filled(key)).flatten() {
+                self.take(mission);
                 return Ok(true);
             }
             while self.partial.len() > MAX_PARTIAL {
@@ -151,28 +153,47 @@ impl Library {
                 chunk.revision
             ));
         }
-        self.offer(Arc::new(mission));
+        self.take(mission);
         Ok(true)
     }
 
-    /// The mission of which a piece came, where those that came and, for the others, the pieces of
-    /// the mission that is held give what its hash says: most of a revision is as it was before.
-    fn filled(&mut self, key: (u32, u64), came: u16) -> Option<Mission> {
-        let whole = self.whole.as_ref()?;
-        let held = self
-            .held
-            .get_or_insert_with(|| chunks(whole).unwrap_or_default());
-        let pieces = self.partial.get(&key)?;
-        let is_as_before = |i: u16| {
-            let before = held.get(usize::from(i)).map(|piece| &piece.bytes);
-            pieces.get(&i).map(|piece| &piece.bytes) == before
+    /// Takes what the pieces gave, and after it whatever it fills: all that is new in a later
+    /// revision may have come before the one that has the rest.
+    fn take(&mut self, mission: Mission) {
+        self.offer(Arc::new(mission));
+        let filled = |library: &mut Self| {
+            let newest_first: Vec<(u32, u64)> = library.partial.keys().rev().copied().collect();
+            newest_first.into_iter().find_map(|key| library.filled(key))
         };
-        // A piece that is as before completes nothing that the one before it did not.
-        if is_as_before(came) {
-            return None;
+        while let Some(mission) = filled(self) {
+            self.offer(Arc::new(mission));
         }
+    }
+
+    /// Cuts the mission that is held whole into its pieces, once.
+    fn cut_whole(&mut self) {
+        let whole = self.whole.as_deref();
+        let pieces = || whole.and_then(|w| chunks(w).ok()).unwrap_or_default();
+        self.held.get_or_insert_with(pieces);
+    }
+
+    /// Whether a piece that came is what the mission held whole has at its place.
+    fn is_as_before(&mut self, key: (u32, u64), index: u16) -> bool {
+        self.cut_whole();
+        let held = self.held.as_ref();
+        let before = held.and_then(|held| held.get(usize::from(index)));
+        let came = self.partial.get(&key).and_then(|pieces| pieces.get(&index));
+        came.map(|piece| &piece.bytes) == before.map(|piece| &piece.bytes)
+    }
+
+    /// The mission of which pieces came, where they and, for the others, the pieces of the mission
+    /// that is held give what its hash says: most of a revision is as it was before.
+    fn filled(&mut self, key: (u32, u64)) -> Option<Mission> {
+        self.cut_whole();
+        let (pieces, held) = (self.partial.get(&key)?, self.held.as_ref()?);
+        let count = pieces.values().next()?.chunks;
         let mut bytes = Vec::new();
-        for i in 0..pieces.get(&came)?.chunks {
+        for i in 0..count {
             let piece = pieces.get(&i).or_else(|| held.get(usize::from(i)))?;
             bytes.extend_from_slice(&piece.bytes);
         }
@@ -282,6 +303,36 @@ mod tests {
             }
             assert_eq!(library.newest().unwrap().revision, 1);
         }
+    }
+
+    /// Who begins anew hears of the mission before and of what is new in any order.
+    #[test]
+    fn what_is_new_may_come_before_the_revision_that_has_the_rest() {
+        let mut library = Library::new(Some(Arc::new(mission(1, 4))));
+        let revised = |of: &Mission, east_mm| Mission {
+            revision: of.revision + 1,
+            base: (east_mm, 0),
+            ..of.clone()
+        };
+        let second = mission(2, 500);
+        let third = revised(&second, 7);
+        let fourth = revised(&third, 8);
+        let [old, newer, newest] = [&second, &third, &fourth].map(|m| chunks(m).unwrap());
+        let pieces = || (0u16..).zip(&newest).zip(newer.iter().zip(&old));
+        // Of the newest what is new in it, of the one before what is new in that one.
+        for ((i, newest), (newer, old)) in pieces() {
+            let pairs = [(newest, newer), (newer, old)];
+            for (piece, _) in pairs.into_iter().filter(|(p, b)| p.bytes != b.bytes) {
+                assert_eq!(library.chunk(i, piece), Ok(false));
+            }
+        }
+        assert_eq!(library.newest().unwrap().revision, 1);
+        for ((i, _), (_, old)) in pieces() {
+            let is_last = i + 1 == old.chunks;
+            assert_eq!(library.chunk(i, old), Ok(is_last));
+        }
+        assert_eq!(*library.newest().unwrap(), fourth);
+        assert!(library.partial.is_empty());
     }
 
     #[test]
