@@ -634,8 +634,10 @@ impl Membership {
         }
         let was_asked = known.urgency(now, &limits, self.period_ms) > 0;
         let passes_on = is_far && was_asked && heard.suspected.is_none() && !new_life;
+        let was_sought = known.is_sought(now);
         let before = known.freshest;
-        if known.status == Status::Down {
+        let was_down = known.status == Status::Down;
+        if was_down {
             known.is_back(now);
         }
         known.note_fresh_count(now, &heard);
@@ -660,8 +662,12 @@ impl Membership {
             known.is_news_until(urgent_until);
             changes.push(known.change());
         }
-        if passes_on {
+        let is_back = was_down && !new_life && status == Status::Alive;
+        if passes_on || (is_back && was_sought) {
             self.questions.answer(heard.id, before.count);
+        }
+        if is_back {
+            self.seek(now, bound_ms);
         }
         true
     }
@@ -776,13 +782,7 @@ impl Membership {
             self.changes += 1;
         }
         self.bury_unheard(now, patience.bound_ms, &mut changes);
-        if self.is_far(now) {
-            for known in self.known.values_mut() {
-                if known.asks_at_once(now, &patience, self.period_ms) {
-                    self.questions.ask(known.freshest.id, known.freshest.count);
-                }
-            }
-        }
+        self.ask_at_once(now, &patience);
         changes
     }
 

@@ -1,4 +1,5 @@
-//! What is asked for and answered at once, from peer to peer (decisions 72, 76 and 163).
+//! What is asked for and answered at once, from peer to peer (decisions 72, 76, 163 and
+//! 164).
 
 use super::known::HeardHeartbeat;
 use super::questions::urgency;
@@ -12,6 +13,9 @@ use std::collections::BTreeSet;
 /// Whoever knows a later heartbeat of somebody says so at once, once in so many intervals.
 const ANSWER_INTERVALS: u64 = 2;
 
+/// Who is sought is asked for again after so many of the longest intervals.
+const SEEK_INTERVALS: u64 = 3;
+
 /// With what is said at once so many others go at most that were said before: four heartbeats of
 /// others are about as long as the headers of a transmission.
 const BESIDE_MAX: usize = 4;
@@ -20,7 +24,8 @@ impl Membership {
     /// Somebody asks for a heartbeat later than one that is known here, or says what this peer
     /// was to say.
     pub(super) fn hear_question(&mut self, now: Time, told: &HeardHeartbeat, limits: Patience) {
-        if !self.is_far(now) {
+        // Who holds somebody for down whom this peer hears is far from that one.
+        if !self.is_far(now) && told.age.ms(now) <= limits.bound_ms {
             return;
         }
         let verdict_ms = limits.verdict_ms(ms_of(told.interval, self.period_ms));
@@ -34,6 +39,26 @@ impl Membership {
             && known.answers(now, told, again_ms)
         {
             self.questions.answer(told.id, told.count);
+        }
+    }
+
+    /// Somebody came back who was held for down: all others who are may have come with it, and
+    /// are asked for until the bound is over.
+    pub(super) fn seek(&mut self, now: Time, bound_ms: u64) {
+        for known in self.known.values_mut() {
+            known.seek(now, now.plus_ms(bound_ms));
+        }
+    }
+
+    /// Notes who is to be asked for now.
+    pub(super) fn ask_at_once(&mut self, now: Time, patience: &Patience) {
+        let is_far = self.is_far(now);
+        let again_ms = SEEK_INTERVALS * patience.interval_ms;
+        for known in self.known.values_mut() {
+            let asks = is_far && known.asks_at_once(now, patience, self.period_ms);
+            if asks || known.seeks_at_once(now, again_ms) {
+                self.questions.ask(known.freshest.id, known.freshest.count);
+            }
         }
     }
 
@@ -56,7 +81,7 @@ impl Membership {
         let mut said = BTreeSet::new();
         for (id, waiting) in self.questions.take(now, max) {
             let known = self.known.get_mut(&id);
-            let Some(known) = known.filter(|k| waiting.holds(k)) else {
+            let Some(known) = known.filter(|k| waiting.holds(now, k)) else {
                 continue;
             };
             if waiting.answers {
@@ -85,13 +110,15 @@ impl Membership {
         let most = max.min(said.len() + BESIDE_MAX);
         let patience = self.patience(now);
         let again = self.questions.answered();
-        let again = again.filter(|(id, w)| self.known.get(id).is_some_and(|k| w.holds(k)));
+        let again = again.filter(|(id, w)| self.known.get(id).is_some_and(|k| w.holds(now, k)));
         let again = again.map(|(id, _)| id);
         let asked = self.known.iter().filter(|(_, k)| k.asked > 0);
         let mut asked: Vec<(u8, u16)> = asked
             .map(|(id, k)| (k.urgency(now, &patience, self.period_ms), *id))
             .filter(|(urgency, _)| *urgency > 0)
             .collect();
+        let sought = self.known.iter().filter(|(_, k)| k.is_sought(now));
+        asked.extend(sought.map(|(id, _)| (0, *id)));
         asked.sort_by_key(|(urgency, id)| (Reverse(*urgency), *id));
         for id in again.chain(asked.into_iter().map(|(_, id)| id)) {
             if said.len() < most {

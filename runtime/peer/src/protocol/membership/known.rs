@@ -98,6 +98,8 @@ pub(super) struct Known {
     pub(super) asked: u8,
     /// When this peer last answered for it at once.
     pub(super) answered_at: Time,
+    /// That it is asked for although it is down.
+    sought: Option<Sought>,
     /// It lost its disk and uses an incarnation twice. It is told, so that it takes a new one.
     reuse: Option<Reuse>,
 }
@@ -190,6 +192,14 @@ pub(super) struct Absence {
     is_met: bool,
 }
 
+/// Somebody who is down may have come back with another.
+#[derive(Clone, Copy, Debug)]
+struct Sought {
+    until: Time,
+    /// When it is next asked for.
+    at: Time,
+}
+
 /// One life was begun twice.
 #[derive(Clone, Copy, Debug)]
 struct Reuse {
@@ -254,6 +264,7 @@ impl Known {
             told_sent: Told::default(),
             asked: 0,
             answered_at: Time(0),
+            sought: None,
             reuse: None,
         }
     }
@@ -401,7 +412,7 @@ impl Known {
             until: now,
             is_met: false,
         });
-        self.hops = NO_HOPS;
+        (self.hops, self.sought) = (NO_HOPS, None);
     }
 
     /// Whether it was there well before somebody else came back at that time: who came back little
@@ -495,6 +506,29 @@ impl Known {
         let asks = urgency > self.asked;
         self.asked = self.asked.max(urgency);
         asks
+    }
+
+    /// If it is down it is asked for until then.
+    pub(super) fn seek(&mut self, now: Time, until: Time) {
+        if self.status == Status::Down && !self.is_sought(now) {
+            self.sought = Some(Sought { until, at: now });
+        }
+    }
+
+    /// Whether it is down and asked for.
+    pub(super) fn is_sought(&self, now: Time) -> bool {
+        self.status == Status::Down && self.sought.is_some_and(|sought| now < sought.until)
+    }
+
+    /// Whether it is to be asked for now, who is down.
+    pub(super) fn seeks_at_once(&mut self, now: Time, again_ms: u64) -> bool {
+        let is_sought = self.is_sought(now);
+        let due = self.sought.as_mut().filter(|s| is_sought && s.at <= now);
+        let Some(sought) = due else {
+            return false;
+        };
+        sought.at = now.plus_ms(again_ms);
+        true
     }
 
     /// How urgent it is to hear of it: 0 while gossip has time, and of who is down.
@@ -629,6 +663,9 @@ impl Known {
             interval,
             ..
         } = self.freshest;
+        // Who is down is asked for by the age of its heartbeat: the verdict is not for others.
+        let suspected = self.freshest.suspected;
+        let suspected = suspected.filter(|_| self.status != Status::Down);
         Fresh {
             id,
             life: Fresh::life_of(incarnation),
@@ -637,7 +674,7 @@ impl Known {
             hops: self.distance(now, interval_ms),
             interval,
             able: self.info.able,
-            suspected_ds: self.freshest.suspected.map(|age| age.full_ds(now)),
+            suspected_ds: suspected.map(|age| age.full_ds(now)),
         }
     }
 

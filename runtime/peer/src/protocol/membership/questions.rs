@@ -47,12 +47,12 @@ struct Again {
 
 impl Waiting {
     /// Whether it is still to be said of who is known so.
-    pub(super) fn holds(&self, known: &Known) -> bool {
+    pub(super) fn holds(&self, now: Time, known: &Known) -> bool {
         let count = known.freshest.count;
         if self.answers {
             count > self.count && known.status == Status::Alive
         } else {
-            count == self.count && known.status != Status::Down
+            count == self.count && (known.status != Status::Down || known.is_sought(now))
         }
     }
 
