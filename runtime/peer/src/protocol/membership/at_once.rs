@@ -1,7 +1,7 @@
 //! What is asked for and answered at once, from peer to peer (decisions 72, 76, 163 and
 //! 164).
 
-use super::known::HeardHeartbeat;
+use super::known::{HeardHeartbeat, Known};
 use super::questions::urgency;
 use super::{Membership, Patience};
 use crate::input::Time;
@@ -16,9 +16,13 @@ const ANSWER_INTERVALS: u64 = 2;
 /// Who is sought is asked for again after so many of the longest intervals.
 const SEEK_INTERVALS: u64 = 3;
 
-/// With what is said at once so many others go at most that were said before: four heartbeats of
-/// others are about as long as the headers of a transmission.
-const BESIDE_MAX: usize = 4;
+/// With what is said at once so many others go at most: eight heartbeats of others are about as
+/// long as the headers of a transmission and the heartbeat of its author.
+const BESIDE_MAX: usize = 8;
+
+/// How urgently somebody is asked for, whether it is sought, and what a neighbour gains that is
+/// behind: of whom nothing is to be said beside.
+const NO_RANK: (u8, bool, Option<(u64, u64)>) = (0, false, None);
 
 impl Membership {
     /// Somebody asks for a heartbeat later than one that is known here, or says what this peer
@@ -74,8 +78,9 @@ impl Membership {
     }
 
     /// What is to be said at once: heartbeats that are asked for, and those that answer. With them
-    /// go answers that nobody was heard passing on, and what is still asked for, as many of them:
-    /// where transmissions are lost, each that arrives brings all that is waited for.
+    /// go answers that nobody was heard passing on, what is still asked for, and those of whom a
+    /// neighbour knows less: where transmissions are lost, each that arrives brings all that is
+    /// waited for.
     pub fn tell_at_once(&mut self, now: Time, max: usize) -> Vec<Fresh> {
         let (interval_ms, own_ms) = (self.interval_ms(), self.own_interval_ms());
         let mut said = BTreeSet::new();
@@ -112,15 +117,17 @@ impl Membership {
         let again = self.questions.answered();
         let again = again.filter(|(id, w)| self.known.get(id).is_some_and(|k| w.holds(now, k)));
         let again = again.map(|(id, _)| id);
-        let asked = self.known.iter().filter(|(_, k)| k.asked > 0);
-        let mut asked: Vec<(u8, u16)> = asked
-            .map(|(id, k)| (k.urgency(now, &patience, self.period_ms), *id))
-            .filter(|(urgency, _)| *urgency > 0)
-            .collect();
-        let sought = self.known.iter().filter(|(_, k)| k.is_sought(now));
-        asked.extend(sought.map(|(id, _)| (0, *id)));
-        asked.sort_by_key(|(urgency, id)| (Reverse(*urgency), *id));
-        for id in again.chain(asked.into_iter().map(|(_, id)| id)) {
+        let rank = |k: &Known| {
+            let is_asked = k.asked > 0;
+            let urgency = is_asked.then(|| k.urgency(now, &patience, self.period_ms));
+            let is_behind = k.is_believed() && k.is_wanted(now);
+            let want = is_behind.then(|| k.want(now));
+            (urgency.unwrap_or(0), k.is_sought(now), want)
+        };
+        let others = self.known.iter().map(|(id, k)| (rank(k), *id));
+        let mut others: Vec<_> = others.filter(|(rank, _)| *rank > NO_RANK).collect();
+        others.sort_by_key(|(rank, id)| (Reverse(*rank), *id));
+        for id in again.chain(others.into_iter().map(|(_, id)| id)) {
             if said.len() < most {
                 said.insert(id);
             }

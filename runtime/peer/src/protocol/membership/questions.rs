@@ -109,8 +109,8 @@ impl Questions {
 
     /// A neighbour tells of somebody who is so many hops from here: whether that is what this peer
     /// was to say. Not if who hears that one is on the other side: a question goes towards the
-    /// one asked for, and counts as said by who is as near; an answer goes away from there, and
-    /// counts as said by who is as far.
+    /// one asked for, and counts as said by who is as near, or once by who is nearer; an answer
+    /// goes away from there, and counts as said by who is as far.
     pub(super) fn hear(
         &mut self,
         told: &HeardHeartbeat,
@@ -143,6 +143,10 @@ impl Questions {
         };
         if same {
             waiting.copies += 1;
+            // Whoever is nearer hears the answer first, and says it.
+            if !waiting.answers && teller_hops < hops {
+                waiting.copies = COPIES_HEARD;
+            }
             if waiting.copies >= COPIES_HEARD {
                 self.waiting.remove(&told.id);
             }

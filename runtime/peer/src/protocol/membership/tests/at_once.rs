@@ -197,17 +197,138 @@ fn who_is_answered_for_and_asked_for_is_told_of_once() {
 }
 
 #[test]
-fn of_those_who_are_asked_for_the_four_most_urgent_go_with_what_is_said_at_once() {
+fn of_those_who_are_asked_for_the_eight_most_urgent_go_with_what_is_said_at_once() {
     let ids = |m: &mut Membership, now| -> Vec<u16> {
         at_once(m, now).iter().map(|said| said.0).collect()
     };
     let mut m = among_many_far_apart();
-    let suspected = (31..).zip([45, 20, 22, 28, 34, 40]);
+    let suspected = (31..).zip([45, 20, 22, 28, 34, 40, 44, 30, 36, 43, 27]);
     let others: Vec<Fresh> = suspected.map(|(id, ds)| asked_of(id, ds)).collect();
     m.on_others(Time(3_000), 3, &others);
-    assert_eq!(ids(&mut m, Time(3_050)), [31, 32, 33, 34, 35, 36]);
-    m.on_others(Time(3_100), 3, &[asked_of(38, 20)]);
-    assert_eq!(ids(&mut m, Time(3_150)), [31, 34, 35, 36, 38]);
+    assert_eq!(ids(&mut m, Time(3_050)), (31..=41).collect::<Vec<u16>>());
+    m.on_others(Time(3_100), 3, &[asked_of(42, 20)]);
+    assert_eq!(
+        ids(&mut m, Time(3_150)),
+        [31, 34, 35, 36, 37, 38, 39, 40, 42]
+    );
+}
+
+/// Peer 3 lost sight of 30 and of 31, and tells old heartbeats of both.
+#[test]
+fn with_an_answer_go_later_heartbeats_than_a_neighbour_knows() {
+    let mut m = among_many_far_apart();
+    let of_31 = |count, age_ds| Fresh {
+        id: 31,
+        heartbeat: count,
+        age_ds,
+        ..asked(0, None)[0]
+    };
+    m.on_others(Time(2_600), 4, &[of_31(9, 1)]);
+    m.on_others(Time(3_000), 3, &[of_31(2, 40)]);
+    assert!(m.question_at().is_none(), "nothing is sent for that alone");
+    m.on_others(Time(3_000), 3, &asked(4, Some(20)));
+    assert_eq!(
+        at_once(&mut m, Time(3_100)),
+        [(30, 5, false), (31, 9, false)]
+    );
+}
+
+/// Its answer reaches those who are farther first of all.
+#[test]
+fn a_question_of_one_who_is_nearer_is_heard_once() {
+    for (hops, waits) in [(0, false), (1, false), (2, true)] {
+        let mut m = among_many_far_apart();
+        let told = |hops| {
+            let fresh = asked(5, Some(20))[0];
+            [Fresh { hops, ..fresh }]
+        };
+        m.on_others(Time(3_000), 3, &told(4));
+        assert!(m.take_question());
+        m.on_others(Time(3_050), 5, &told(hops));
+        assert_eq!(m.question_at().is_some(), waits, "asked by {hops} hops");
+    }
+}
+
+/// Peers 30 and 31 were gone for longer than the bound, and 3 tells that 30 is there.
+fn one_came_back() -> (Membership, Time) {
+    let mut m = among_many_far_apart();
+    m.on_others(Time(2_600), 3, &[asked_of(31, 0)]);
+    let (mut now, bound_ms) = (Time(2_600), m.bound_ms(Time(2_600)));
+    for t in 1..=bound_ms.div_ceil(250) + 10 {
+        now = Time(2_600 + t * 250);
+        for id in 2..=20 {
+            m.on_heartbeat(now, id, 1, (100 + t as u32, 4));
+        }
+        m.tick(now);
+        let _ = (m.take_question(), at_once(&mut m, now));
+    }
+    for id in [30, 31] {
+        assert_eq!(m.status(id), Some((1, Status::Down)));
+    }
+    m.tick(now);
+    assert!(!m.take_question(), "of the dead nobody asks");
+    m.on_others(now, 3, &asked(90, None));
+    assert_eq!(m.status(30), Some((1, Status::Alive)));
+    (m, now)
+}
+
+/// Whoever was out of reach comes back with those around it.
+#[test]
+fn who_is_down_is_asked_for_when_another_comes_back_and_no_verdict_is_told() {
+    let (mut m, back) = one_came_back();
+    let bound_ms = m.bound_ms(back);
+    let mut asked_at = Vec::new();
+    for t in 1..(bound_ms + 3_000) / 250 {
+        let now = back.plus_ms(t * 250);
+        for id in 2..=20 {
+            m.on_heartbeat(now, id, 1, (900 + t as u32, 4));
+        }
+        m.on_others(now, 3, &asked(90 + t as u32, None));
+        m.tick(now);
+        if m.take_question() {
+            assert_eq!(at_once(&mut m, now), [(31, 5, false)]);
+            asked_at.push(t * 250);
+        }
+    }
+    assert!(asked_at.len() > 3 && asked_at[0] == 250, "{asked_at:?}");
+    assert!(asked_at.windows(2).all(|two| two[1] - two[0] == 3_000));
+    assert!(asked_at.iter().all(|ms| *ms < bound_ms), "{asked_at:?}");
+}
+
+#[test]
+fn who_was_asked_for_and_is_there_is_told_of_at_once() {
+    let later = Fresh {
+        heartbeat: 80,
+        age_ds: 5,
+        suspected_ds: None,
+        ..asked_of(31, 0)
+    };
+    let (mut m, back) = one_came_back();
+    m.tick(back.plus_ms(250));
+    assert!(m.take_question());
+    m.on_others(back.plus_ms(300), 3, &[later]);
+    assert_eq!(m.status(31), Some((1, Status::Alive)));
+    assert!(m.take_question());
+    assert_eq!(at_once(&mut m, back.plus_ms(400)), [(31, 80, false)]);
+    m.tick(back.plus_ms(500));
+    assert!(!m.take_question());
+}
+
+/// Where all hear each other nobody asks, but who was away for longer than the bound may ask.
+#[test]
+fn who_holds_one_for_down_that_is_heard_here_is_answered_at_once_though_all_are_near() {
+    for (age_ds, answers) in [(100, false), (400, true)] {
+        let mut m = among_nineteen();
+        let now = Time(2_500);
+        assert!(!m.is_far(now) && (10_001..40_000).contains(&m.bound_ms(now)));
+        let held = Fresh {
+            id: 4,
+            age_ds,
+            ..asked(3, None)[0]
+        };
+        m.on_others(now, 3, &[held]);
+        assert_eq!(m.question_at().is_some(), answers, "{age_ds}");
+    }
 }
 
 #[test]
