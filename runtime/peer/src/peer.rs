@@ -852,8 +852,10 @@ impl Peer {
             self.outbound
                 .hasten(self.now, &mut self.timers, &mut self.rng);
         }
-        if self.membership.take_question() {
-            self.delay_question(self.now);
+        if self.membership.take_question()
+            && let Some(at) = self.membership.question_at()
+        {
+            self.delay_question(at);
         }
         for c in changes {
             let (by, at_ms) = (self.config.id.0, self.now.0);

@@ -33,6 +33,8 @@ pub(super) struct Waiting {
     pub(super) count: u32,
     /// Whether a later one is known here.
     pub(super) answers: bool,
+    /// When it is said.
+    at: Time,
     copies: u8,
     /// Which later count this peer answered, how often it may say so again, and when.
     again: Option<Again>,
@@ -56,8 +58,9 @@ impl Waiting {
         }
     }
 
-    fn is_due(&self, now: Time) -> bool {
-        self.again.is_none_or(|again| again.at <= now)
+    /// When it is said, or said again.
+    fn due(&self) -> Time {
+        self.again.map_or(self.at, |again| again.at)
     }
 }
 
@@ -83,20 +86,22 @@ pub(super) struct Questions {
 }
 
 impl Questions {
-    /// Nobody knows a later heartbeat than this one here; whoever does is to say it.
-    pub(super) fn ask(&mut self, id: u16, count: u32) {
-        self.insert(id, count, false);
+    /// Nobody knows a later heartbeat than this one here; whoever does is to say it. Asked from
+    /// then on.
+    pub(super) fn ask(&mut self, id: u16, count: u32, at: Time) {
+        self.insert(id, count, false, at);
     }
 
     /// Somebody knows none later than this count, and this peer does.
     pub(super) fn answer(&mut self, id: u16, count: u32) {
-        self.insert(id, count, true);
+        self.insert(id, count, true, Time(0));
     }
 
-    fn insert(&mut self, id: u16, count: u32, answers: bool) {
+    fn insert(&mut self, id: u16, count: u32, answers: bool, at: Time) {
         let waiting = Waiting {
             count,
             answers,
+            at,
             copies: 0,
             again: None,
         };
@@ -159,7 +164,7 @@ impl Questions {
 
     /// At most so many of those that are due.
     pub(super) fn take(&mut self, now: Time, max: usize) -> BTreeMap<u16, Waiting> {
-        let due = self.waiting.iter().filter(|(_, w)| w.is_due(now));
+        let due = self.waiting.iter().filter(|(_, w)| w.due() <= now);
         let due: Vec<u16> = due.map(|(id, _)| *id).take(max).collect();
         let taken = due.into_iter();
         let taken = taken.filter_map(|id| Some((id, self.waiting.remove(&id)?)));
@@ -189,7 +194,6 @@ impl Questions {
 
     /// When the next of those that wait is due; at once is the beginning of time.
     pub(super) fn next(&self) -> Option<Time> {
-        let at = |w: &Waiting| w.again.map_or(Time(0), |again| again.at);
-        self.waiting.values().map(at).min()
+        self.waiting.values().map(Waiting::due).min()
     }
 }
