@@ -29,10 +29,11 @@ fn asked(heartbeat: u32, suspected_ds: Option<u16>) -> Vec<Fresh> {
     vec![fresh]
 }
 
-/// The same of another.
+/// The same of another, which is two hops from here.
 fn asked_of(id: u16, suspected_ds: u16) -> Fresh {
     Fresh {
         id,
+        hops: 1,
         ..asked(5, Some(suspected_ds))[0]
     }
 }
@@ -231,6 +232,29 @@ fn with_an_answer_go_later_heartbeats_than_a_neighbour_knows() {
         at_once(&mut m, Time(3_100)),
         [(30, 5, false), (31, 9, false)]
     );
+}
+
+/// Whoever is nearer to the one asked for asks, and tells the others.
+#[test]
+fn who_is_farther_asks_later() {
+    for (hops, later_ms) in [(0, 0), (1, 0), (2, 250), (3, 500), (4, 750), (9, 750)] {
+        let mut m = among_many_far_apart();
+        let told = Fresh {
+            hops,
+            ..asked_of(31, 20)
+        };
+        m.on_others(Time(3_000), 3, &[told]);
+        assert!(m.take_question());
+        assert_eq!(m.question_at(), Some(Time(3_000 + later_ms)), "{hops} hops");
+        if later_ms > 0 {
+            assert!(at_once(&mut m, Time(2_999 + later_ms)).is_empty());
+        }
+        assert_eq!(
+            at_once(&mut m, Time(3_000 + later_ms)),
+            [(31, 5, true)],
+            "{hops} hops"
+        );
+    }
 }
 
 /// Its answer reaches those who are farther first of all.
