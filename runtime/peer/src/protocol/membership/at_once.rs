@@ -1,5 +1,5 @@
-//! What is asked for and answered at once, from peer to peer (decisions 72, 76, 163 and
-//! 164).
+//! What is asked for and answered at once, from peer to peer (decisions 72, 76, and 163
+//! to 165).
 
 use super::known::{HeardHeartbeat, Known};
 use super::questions::urgency;
