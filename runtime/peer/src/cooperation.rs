@@ -514,7 +514,8 @@ impl Cooperation {
         if !state.claims.answer(written) {
             return Effects::new();
         }
-        if state.negotiation.adopt(s.now, adoption) {
+        let present = state.company.present();
+        if state.negotiation.adopt(s.now, adoption, &present.live) {
             let expiry = s.now.plus_ms(2 * u64::from(adoption.wait_ms));
             timers.set(Timer::HeldCells, expiry);
         }

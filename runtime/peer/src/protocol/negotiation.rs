@@ -639,12 +639,14 @@ impl Negotiation {
         worthwhile.then_some(adoption)
     }
 
-    /// The adoption is durable: it is the plan from now on, and what was given away is
-    /// held for twice the round's waiting time. Returns false where a later one is known.
-    pub fn adopt(&mut self, now: Time, adoption: &Adoption) -> bool {
+    /// The adoption is durable: it is the plan from now on, but for what others plan at a higher
+    /// stamp by now, and what was given away is held for twice the round's waiting time. Returns
+    /// false where a later one is known.
+    pub fn adopt(&mut self, now: Time, adoption: &Adoption, live: &LivePeers) -> bool {
         if !self.sections.install(adoption.epoch, &adoption.plan) {
             return false;
         }
+        self.sections.settle(live);
         self.sections.set_unassigned(&adoption.unassigned);
         self.adopted_at = Some(now);
         self.decided_at = Some(now);

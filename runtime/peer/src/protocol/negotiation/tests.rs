@@ -190,7 +190,7 @@ impl Desk {
             unassigned: Vec::new(),
             wait_ms: 5000,
         };
-        assert!(self.negotiation.adopt(self.now, &adoption));
+        assert!(self.negotiation.adopt(self.now, &adoption, &self.live));
     }
 }
 
@@ -325,9 +325,35 @@ fn a_division_gives_each_member_its_part_and_all_compute_the_same() {
         .unwrap();
     let mine = adoption.plan.len();
     assert!((10..=14).contains(&mine), "{mine} of 24");
-    assert!(desk.negotiation.adopt(desk.now, &adoption));
-    assert!(!desk.negotiation.adopt(desk.now, &adoption), "once");
+    let (now, live) = (desk.now, &desk.live);
+    assert!(desk.negotiation.adopt(now, &adoption, live));
+    assert!(!desk.negotiation.adopt(now, &adoption, live), "once");
     assert_eq!(desk.negotiation.adoptions, 1);
+}
+
+/// Where parts met while the adoption was written, another may have claimed some of it.
+#[test]
+fn what_a_live_peer_lists_at_a_higher_stamp_by_then_is_not_adopted() {
+    for (live, planned) in [
+        (LivePeers::from([(2, 1)]), vec![0, 1, 5]),
+        (LivePeers::new(), vec![0, 1, 2, 3, 4, 5]),
+    ] {
+        let mut desk = Desk::new(&[2]);
+        desk.live = live;
+        desk.claim(2, 1, 2, 3, 600_000);
+        let epoch = desk.negotiation.sections.heard()[&2].claim.epoch;
+        let section: Vec<_> = (0..6).map(|c| (c, Direction::Forward)).collect();
+        let adoption = Adoption {
+            epoch,
+            plan: desk.negotiation.sections.adopted(epoch, &[], &section),
+            unassigned: Vec::new(),
+            wait_ms: 5000,
+        };
+        assert_eq!(adoption.plan.len(), 6);
+        assert!(desk.negotiation.adopt(desk.now, &adoption, &desk.live));
+        let plan = desk.negotiation.sections.plan();
+        assert_eq!(plan.iter().map(|p| p.cell).collect::<Vec<_>>(), planned);
+    }
 }
 
 #[test]
