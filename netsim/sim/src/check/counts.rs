@@ -33,7 +33,8 @@ const MAY_STAND_MPS: f64 = 3.0;
 /// the outline when it was begun or ended, and how many are now; this times the root of how often it
 /// was begun at least. A UAV's place is off by two metres, a standard deviation each way, and so is
 /// all that it sees for minutes: who drives over the outline just then is on the wrong side of a
-/// beginning or an end.
+/// beginning or an end. Such errors even out over many UAVs, but not where one that is farther off
+/// looks again and again at a place where vehicles wait: it may be off by all who were as near.
 const OFF: f64 = 2.0;
 const OFF_SHARE: f64 = 0.1;
 const OFF_BEGUN: f64 = 1.2;
@@ -286,6 +287,9 @@ struct Edges {
     /// How many were near the outline when it was begun or ended, and at the last look.
     near: u32,
     near_now: u32,
+    /// How many of them were as near as the UAV was off, or nearer.
+    within: u32,
+    within_now: u32,
 }
 
 impl Edges {
@@ -293,12 +297,16 @@ impl Edges {
         self.begun += more.begun;
         self.near += more.near;
         self.near_now += more.near_now;
+        self.within += more.within;
+        self.within_now += more.within_now;
     }
 
     /// By how much it may be off.
     fn slack(&self) -> f64 {
         let near = f64::from(self.near + self.near_now).sqrt();
-        near.max(OFF_BEGUN * f64::from(self.begun).sqrt())
+        let within = f64::from(self.within + self.within_now);
+        near.max(within)
+            .max(OFF_BEGUN * f64::from(self.begun).sqrt())
     }
 }
 
@@ -448,13 +456,24 @@ impl CountCheck {
                 self.stood.insert((i, look.uav, own.seen_ms), stood);
             }
             let was = watch.counts;
-            let near = if counts || was { site.near(truth) } else { 0 };
+            let is_watch = counts || was;
+            let near = |reach_m: f64| {
+                let is_near = is_watch && reach_m > 0.0;
+                if is_near {
+                    site.near(truth, reach_m)
+                } else {
+                    0
+                }
+            };
+            let (near, within) = (near(NEAR_M), near(look.displaced_m.min(NEAR_M)));
+            let edges = &mut watch.edges;
             if counts == was {
-                watch.edges.near_now = near;
+                (edges.near_now, edges.within_now) = (near, within);
             } else {
-                watch.edges.near += near;
-                watch.edges.near_now = 0;
-                watch.edges.begun += u32::from(counts);
+                edges.near += near;
+                edges.within += within;
+                (edges.near_now, edges.within_now) = (0, 0);
+                edges.begun += u32::from(counts);
             }
             (watch.counts, watch.own) = (counts, own);
             let at = (now_ms, look.uav);
@@ -632,11 +651,11 @@ impl CountCheck {
 }
 
 impl Site {
-    /// How many vehicles are near its outline.
-    fn near(&self, truth: &[Point]) -> u32 {
+    /// How many vehicles are as near to its outline, metres.
+    fn near(&self, truth: &[Point], reach_m: f64) -> u32 {
         let is_near = |p: &&Point| {
             let apart_m = (**p - self.middle).norm();
-            apart_m <= self.radius_m + NEAR_M && self.outline.outline_distance_m(**p) <= NEAR_M
+            apart_m <= self.radius_m + reach_m && self.outline.outline_distance_m(**p) <= reach_m
         };
         u32::try_from(truth.iter().filter(is_near).count()).unwrap_or(u32::MAX)
     }

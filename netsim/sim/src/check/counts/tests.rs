@@ -25,6 +25,7 @@ struct Scene {
     found: Findings,
     sites: u32,
     is_late: bool,
+    displaced_m: f64,
     is_open: bool,
 }
 
@@ -39,6 +40,7 @@ impl Scene {
             found: Findings::new(0),
             sites: mission.sites_hash(),
             is_late: false,
+            displaced_m: 0.0,
             is_open: true,
         }
     }
@@ -64,7 +66,7 @@ impl Scene {
                 uav: 1,
                 picture: Picture::level(Pose::new(at, 0.0), (40.0, 30.0)),
                 sees: &|_| self.is_open,
-                displaced_m: 0.0,
+                displaced_m: self.displaced_m,
                 counted: &counted,
             };
             let now_ms = (s * 1000.0).round() as u64;
@@ -134,22 +136,36 @@ fn whoever_was_near_the_outline_at_an_edge_of_a_watch_may_be_counted_or_not() {
         begun,
         near,
         near_now,
+        ..Edges::default()
+    };
+    // Where one that is far off looks at those who wait near the outline all may be miscounted.
+    let queue = |within, within_now| Edges {
+        within,
+        within_now,
+        ..edges(2, 4, 1)
     };
     for (says, edges, off) in [
         (5, edges(2, 1, 0), true),
         (5, edges(2, 4, 1), false),
         (7, edges(2, 4, 1), true),
+        (7, queue(3, 1), false),
+        (8, queue(3, 1), true),
+        (5, queue(1, 0), false),
         (5, edges(3, 0, 0), false),
     ] {
         assert_eq!(is_off(says, 1, &edges), off, "{says} {edges:?}");
     }
-    let mut scene = Scene::new(Counted::Passing);
-    scene.look((0, 8), Point::origin(), &|s| {
-        (s < 4.0, counting(1.0)(s.min(4.0)).1)
-    });
-    let edges = scene.check.watchers[&1].watches[0].edges;
-    // The parked one stands five metres from it, the other one begins ten metres outside.
-    assert_eq!((edges.begun, edges.near, edges.near_now), (1, 2, 0));
+    for (displaced_m, within) in [(0.0, 0), (4.5, 0), (5.5, 2)] {
+        let mut scene = Scene::new(Counted::Passing);
+        scene.displaced_m = displaced_m;
+        scene.look((0, 8), Point::origin(), &|s| {
+            (s < 4.0, counting(1.0)(s.min(4.0)).1)
+        });
+        let edges = scene.check.watchers[&1].watches[0].edges;
+        // The parked one stands five metres from it, the other one begins ten metres outside.
+        assert_eq!((edges.begun, edges.near, edges.near_now), (1, 2, 0));
+        assert_eq!(edges.within, within, "{displaced_m} m");
+    }
 }
 
 #[test]
