@@ -456,16 +456,11 @@ impl CountCheck {
                 self.stood.insert((i, look.uav, own.seen_ms), stood);
             }
             let was = watch.counts;
-            let is_watch = counts || was;
-            let near = |reach_m: f64| {
-                let is_near = is_watch && reach_m > 0.0;
-                if is_near {
-                    site.near(truth, reach_m)
-                } else {
-                    0
-                }
+            let (near, within) = if counts || was {
+                site.near(truth, look.displaced_m)
+            } else {
+                (0, 0)
             };
-            let (near, within) = (near(NEAR_M), near(look.displaced_m.min(NEAR_M)));
             let edges = &mut watch.edges;
             if counts == was {
                 (edges.near_now, edges.within_now) = (near, within);
@@ -651,13 +646,19 @@ impl CountCheck {
 }
 
 impl Site {
-    /// How many vehicles are as near to its outline, metres.
-    fn near(&self, truth: &[Point], reach_m: f64) -> u32 {
-        let is_near = |p: &&Point| {
-            let apart_m = (**p - self.middle).norm();
-            apart_m <= self.radius_m + reach_m && self.outline.outline_distance_m(**p) <= reach_m
-        };
-        u32::try_from(truth.iter().filter(is_near).count()).unwrap_or(u32::MAX)
+    /// How many vehicles are near its outline, and how many of them no farther from it than a UAV
+    /// is off, metres.
+    fn near(&self, truth: &[Point], off_m: f64) -> (u32, u32) {
+        let (mut near, mut within) = (0, 0);
+        for at in truth {
+            if (*at - self.middle).norm() > self.radius_m + NEAR_M {
+                continue;
+            }
+            let apart_m = self.outline.outline_distance_m(*at);
+            near += u32::from(apart_m <= NEAR_M);
+            within += u32::from(off_m > 0.0 && apart_m <= off_m.min(NEAR_M));
+        }
+        (near, within)
     }
 
     /// Whether all of it is in so much of a picture, each way.

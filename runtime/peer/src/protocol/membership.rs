@@ -547,8 +547,7 @@ impl Membership {
             && let Some(known) = self.known.get_mut(&heartbeat.id)
             && known.asks_at_once(now, &limits, self.period_ms)
         {
-            let at = at_once::ask_from(now, known, &limits);
-            self.questions.ask(heartbeat.id, known.freshest.count, at);
+            self.questions.ask(now, known, &limits);
         }
     }
 

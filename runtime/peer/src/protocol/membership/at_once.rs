@@ -16,13 +16,6 @@ const ANSWER_INTERVALS: u64 = 2;
 /// Who is sought is asked for again after so many of the longest intervals.
 const SEEK_INTERVALS: u64 = 3;
 
-/// Who hears of somebody from a neighbour that hears that one asks first.
-const NEAR_HOPS: u8 = 2;
-
-/// With each hop more one asks this part of the longest interval later, of so many hops at most.
-const TURNS: u64 = 4;
-const FARTHER_MAX: u8 = 3;
-
 /// With what is said at once so many others go at most: eight heartbeats of others are about as
 /// long as the headers of a transmission and the heartbeat of its author.
 const BESIDE_MAX: usize = 8;
@@ -30,14 +23,6 @@ const BESIDE_MAX: usize = 8;
 /// How urgently somebody is asked for, whether it is sought, and what a neighbour gains that is
 /// behind: of whom nothing is to be said beside.
 const NO_RANK: (u8, bool, Option<(u64, u64)>) = (0, false, None);
-
-/// Whoever is nearer to the one asked for asks first: its question goes on from there, and its
-/// answer reaches the others.
-pub(super) fn ask_from(now: Time, known: &Known, patience: &Patience) -> Time {
-    let hops = known.distance(now, patience.interval_ms);
-    let farther = hops.saturating_sub(NEAR_HOPS).min(FARTHER_MAX);
-    now.plus_ms(u64::from(farther) * patience.interval_ms / TURNS)
-}
 
 impl Membership {
     /// Somebody asks for a heartbeat later than one that is known here, or says what this peer
@@ -76,9 +61,7 @@ impl Membership {
         for known in self.known.values_mut() {
             let asks = is_far && known.asks_at_once(now, patience, self.period_ms);
             if asks || known.seeks_at_once(now, again_ms) {
-                let at = ask_from(now, known, patience);
-                self.questions
-                    .ask(known.freshest.id, known.freshest.count, at);
+                self.questions.ask(now, known, patience);
             }
         }
     }

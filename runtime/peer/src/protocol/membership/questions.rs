@@ -18,6 +18,13 @@ const ASKS_PATIENT: u64 = 1;
 const AGES: u64 = 10;
 const AGES_PATIENT: u64 = 5;
 
+/// Who hears of somebody from a neighbour that hears that one asks first.
+const NEAR_HOPS: u8 = 2;
+
+/// With each hop more one asks this part of the longest interval later, of so many hops at most.
+const TURNS: u64 = 4;
+const FARTHER_MAX: u8 = 3;
+
 /// What was heard from so many neighbours meanwhile is not said again: one copy is not enough
 /// where three in ten are lost.
 const COPIES_HEARD: u8 = 2;
@@ -86,10 +93,14 @@ pub(super) struct Questions {
 }
 
 impl Questions {
-    /// Nobody knows a later heartbeat than this one here; whoever does is to say it. Asked from
-    /// then on.
-    pub(super) fn ask(&mut self, id: u16, count: u32, at: Time) {
-        self.insert(id, count, false, at);
+    /// Nobody knows a later heartbeat than this one here; whoever does is to say it. Whoever is
+    /// nearer to the one asked for asks first: its question goes on from there, and its answer
+    /// reaches the others.
+    pub(super) fn ask(&mut self, now: Time, known: &Known, patience: &Patience) {
+        let hops = known.distance(now, patience.interval_ms);
+        let farther = hops.saturating_sub(NEAR_HOPS).min(FARTHER_MAX);
+        let at = now.plus_ms(u64::from(farther) * patience.interval_ms / TURNS);
+        self.insert(known.freshest.id, known.freshest.count, false, at);
     }
 
     /// Somebody knows none later than this count, and this peer does.
