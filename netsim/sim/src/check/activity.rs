@@ -7,7 +7,7 @@
 use super::{Clocks, Findings, PeerSnapshot, Snapshot};
 use skein_peer::diagram::{Machine, MissionEvent, Part, StateGoal};
 use skein_peer::output::Status;
-use skein_peer::wire::detection::Stands;
+use skein_peer::wire::detection::{Detection, Stands};
 use skein_peer::wire::message::Order;
 use skein_peer::wire::tasks::{Progress, TaskId};
 use skein_peer::{Mission, WIND_CALMER_MPS};
@@ -116,6 +116,15 @@ impl ActivityCheck {
     /// A process starts.
     pub fn on_boot(&mut self, now_ms: u64, id: u16) {
         self.looked_ms.insert(id, now_ms);
+    }
+
+    /// A process knows of an object that a mission looks for: it may be withdrawn before the next
+    /// snapshot, and have ended that mission meanwhile.
+    pub fn on_detected(&mut self, id: u16, told: &Detection) {
+        if told.stands == Stands::Told {
+            let known = self.found.entry(id).or_insert(told.sortie);
+            *known = told.sortie.max(*known);
+        }
     }
 
     /// A process ends, with all that it knew, or stands still (`death` is false).
@@ -319,10 +328,10 @@ impl ActivityCheck {
         let facts = self.facts(snapshot, m, &flown);
         let after_s = flown.machine.ends_after_s();
         let timer = after_s.map(|s| facts.holds(0, (MissionEvent::Timer, s)));
-        if flown.machine.ends_when_found() && facts.is_found() {
+        if facts.is_found() {
             self.found.insert(m.id, flown.sortie);
         }
-        if self.found.get(&m.id) == Some(&flown.sortie) {
+        if flown.machine.ends_when_found() && self.found.get(&m.id) == Some(&flown.sortie) {
             return;
         }
         if timer.is_some_and(|holds| holds != Holds::No) {
@@ -542,7 +551,6 @@ mod tests {
     use skein_peer::Beliefs;
     use skein_peer::Mission;
     use skein_peer::diagram::{State, Transition};
-    use skein_peer::wire::detection::Detection;
     use std::sync::Arc;
 
     fn mission() -> Arc<Mission> {
@@ -793,6 +801,40 @@ mod tests {
             Stands::Withdrawn
         ]));
         assert!(broken(&[Stands::Withdrawn]));
+    }
+
+    /// It hears of it, ends, and hears that it is withdrawn, all between two snapshots.
+    #[test]
+    fn who_heard_of_it_between_two_snapshots_has_ended_rightly_too() {
+        let ends = with_state("found", Some(Part::Ends), (MissionEvent::ObjectDetected, 0));
+        let goes_on = with_state("found", None, (MissionEvent::ObjectDetected, 0));
+        let broken = |mission: &Mission, heard: Option<Detection>| {
+            let (mut story, mut findings) = (Story::new(0), Findings::new(1));
+            let mut check = ActivityCheck::default();
+            check.on_mission(mission);
+            if let Some(told) = heard {
+                check.on_detected(1, &told);
+            }
+            let view = Beliefs {
+                finished: true,
+                ..speaking()
+            };
+            story.snapshot(0, &[(1, view)], |s| check.on_snapshot(s, &mut findings));
+            findings.counts.contains_key("activity")
+        };
+        let told = |sortie| Detection {
+            sortie,
+            ..Detection::default()
+        };
+        assert!(!broken(&ends, Some(told(ends.sortie))));
+        assert!(broken(&ends, None));
+        assert!(broken(&ends, Some(told(ends.sortie + 1))));
+        assert!(broken(&goes_on, Some(told(ends.sortie))));
+        let withdrawn = Detection {
+            stands: Stands::Withdrawn,
+            ..told(ends.sortie)
+        };
+        assert!(broken(&ends, Some(withdrawn)));
     }
 
     /// It came from a task when what was found was withdrawn, and waits; then another tells the

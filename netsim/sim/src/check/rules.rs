@@ -219,6 +219,7 @@ impl Rules {
                 news,
                 ..
             } => self.tasks.on_report(id, (*task, *revision), news),
+            Report::Detected { told, .. } => self.activity.on_detected(id, told),
             Report::Ready { loop_hash, .. } => {
                 let before = self.loops.insert(id, *loop_hash);
                 self.on_loop_of(id, before, *loop_hash);

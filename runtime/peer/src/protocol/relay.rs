@@ -9,7 +9,8 @@
 //! | record | event | what follows |
 //! |---|---|---|
 //! | unknown, or of an older version | it is heard | held; passed on after 20 to 260 ms, if it made fewer than 16 hops |
-//! | held in this version | a copy is heard | with the second copy it is not passed on any more |
+//! | held in this version | a copy is heard | with the second copy it is not passed on any more; all that its author says itself are one |
+//! | an order | it is heard | passed on before all else, by everybody once |
 //! | held in a newer version, or of an earlier life and no piece of a mission | it is heard | nothing |
 //! | any of an author but pieces of missions | a later life of the author is heard | void: neither held nor sent |
 //! | held | a neighbour's beacon shows that it lacks it | sent again, once in 2 T, unless somebody was heard doing so |
@@ -345,13 +346,21 @@ impl Relay {
                 return Offer::Stale;
             }
             if version == known {
-                h.copies = h.copies.saturating_add(1);
+                // What its author says again reaches those whom it reached before. Of pieces it is
+                // told who lacks them.
+                let is_repeated = hops == 0 && h.hops == 1 && !is_piece(&key);
+                h.copies = if is_repeated {
+                    h.copies.max(1)
+                } else {
+                    h.copies.saturating_add(1)
+                };
                 h.is_passed_on = true;
                 h.lack = 0;
                 h.sent = now;
                 // A copy by a shorter way: what is passed on has made fewer hops.
                 h.hops = h.hops.min(hops.saturating_add(1));
-                if h.copies >= COPIES_HEARD {
+                let is_enough = h.copies >= COPIES_HEARD;
+                if is_enough && !(kind == Kind::Operator && h.said == 0) {
                     self.queue.remove(&key);
                 }
                 return Offer::Duplicate;
@@ -486,7 +495,10 @@ impl Relay {
     fn standing(&self, key: &RecordKey, priority: Priority) -> Standing {
         let unsaid = || self.held.get(key).is_some_and(|h| h.copies == 0);
         let is_end = key.1 == Kind::Finished.number();
+        let is_order = key.1 == Kind::Operator.number();
+        let passes_on = || self.held.get(key).is_some_and(|h| h.said == 0);
         match priority {
+            _ if key.0 != self.me && is_order && passes_on() => Standing::First,
             _ if key.0 != self.me => Standing::Due,
             Priority::Conflict | Priority::Claim if unsaid() => Standing::First,
             Priority::Telemetry if is_end && unsaid() => Standing::First,

@@ -251,7 +251,7 @@ const TABLE: [KindRow; 23] = [
         Priority::Claim,
         Lifetime::Beacons(9),
     ),
-    // A target is out of date when the next look at it is told.
+    // The next look at a target takes the place of this one; the last is where it is looked for.
     KindRow {
         subjects: super::target::TARGETS_MAX,
         ..row(
@@ -259,7 +259,7 @@ const TABLE: [KindRow; 23] = [
             "target",
             72,
             Priority::Telemetry,
-            Lifetime::Beacons(2),
+            Lifetime::Beacons(9),
         )
     },
     // Told once: it matters as long as what the operator says.

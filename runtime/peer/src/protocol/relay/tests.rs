@@ -17,6 +17,13 @@ fn record(author: u16, seq: u32) -> Record {
     }
 }
 
+fn of_kind(kind: Kind, author: u16) -> Record {
+    Record {
+        kind: kind.number(),
+        ..record(author, 1)
+    }
+}
+
 /// The number of a neighbour's beacon.
 const BEACON: u32 = 5;
 
@@ -63,6 +70,57 @@ fn two_copies_heard_are_enough() {
     r.offer(Time(5000), &record(1, 1), &[1; 40], 0);
     r.offer(Time(5001), &record(1, 1), &[1; 40], 1);
     assert_eq!(r.poll(Time(5500)), None);
+}
+
+/// Its author says it again because it hears nobody passing it on: whoever holds it from its author
+/// waits in a full queue, and would never do so.
+#[test]
+fn what_its_author_repeats_is_passed_on_all_the_same() {
+    let heard = |hops: &[u8]| {
+        let mut r = relay(3);
+        for (t, hops) in (5_000..).zip(hops) {
+            r.offer(Time(t), &record(1, 1), &[1; 40], *hops);
+        }
+        r.poll(Time(5_500)).map(|out| out.hops)
+    };
+    assert_eq!(heard(&[0, 0, 0, 0]), Some(1));
+    assert_eq!(heard(&[0, 0, 1]), None, "somebody passed it on");
+    assert_eq!(heard(&[2, 0]), None, "two said it");
+    assert_eq!(heard(&[2]), Some(3));
+}
+
+/// An order goes before all that waits, and everybody who hears it passes it on, once.
+#[test]
+fn an_order_is_passed_on_by_all_and_before_all_else() {
+    let mut r = relay(3);
+    r.offer(Time(5_000), &of_kind(Kind::Claim, 2), &[2; 40], 0);
+    let order = of_kind(Kind::Operator, 100);
+    for (t, hops) in (5_001..).zip([0, 1, 1, 2]) {
+        r.offer(Time(t), &order, &[3; 40], hops);
+    }
+    let next = |r: &mut Relay, now_ms| r.poll(Time(now_ms)).map(|out| out.bytes[0]);
+    assert_eq!(next(&mut r, 5_500), Some(3));
+    assert_eq!(next(&mut r, 5_501), Some(2));
+    assert_eq!(next(&mut r, 6_000), None, "once");
+    // Said again for who lacks it, two others are enough.
+    r.catch_up(Time(9_000), &holds(100, 1, 0, 0), BEACON);
+    for t in [9_001, 9_002] {
+        r.offer(Time(t), &order, &[3; 40], 2);
+    }
+    assert_eq!(next(&mut r, 9_900), None);
+}
+
+/// Where the share is taken by what is due sooner, what is followed is told late, but told.
+#[test]
+fn a_target_outlasts_its_turn() {
+    let waits = |kind: Kind| {
+        let mut r = relay(3);
+        r.offer(Time(5_000), &of_kind(kind, 2), &[2; 40], 0);
+        let intervals = 4 * r.air.interval_ms();
+        r.poll(Time(5_000 + intervals)).is_some()
+    };
+    assert!(waits(Kind::Target) && waits(Kind::Claim));
+    assert!(!waits(Kind::State), "for people alone");
 }
 
 #[test]
@@ -652,7 +710,7 @@ fn of_many_records_the_newest_are_said_again_and_others_in_turn() {
     for seq in 1..=20 {
         let (record, bytes) = many(1, seq);
         r.offer(Time(5_000), &record, &bytes, 0);
-        r.offer(Time(5_000), &record, &bytes, 0);
+        r.offer(Time(5_000), &record, &bytes, 1);
     }
     let newest: BTreeSet<u16> = (17..=20).collect();
     let mut all = BTreeSet::new();
