@@ -200,10 +200,15 @@ impl SpreadCheck {
             let life = lives.entry(key.0).or_default();
             *life = (*life).max(most[*place].0);
         }
-        // A later life voids all that earlier ones said; an author knows its own.
+        // A later life voids all that earlier ones said, whether or not it said anything; an
+        // author knows its own.
         for m in peers {
             let life = lives.entry(m.speaks_as).or_default();
             *life = (*life).max(m.view.incarnation);
+            for (known, (incarnation, _)) in &m.view.peers {
+                let life = lives.entry(known.0).or_default();
+                *life = (*life).max(*incarnation);
+            }
         }
         let newest = self.places.iter().map(|(key, i)| (*key, *i, most[*i]));
         let is_held = |version: &Version| *version > Version::default();
@@ -368,8 +373,9 @@ impl SpreadCheck {
 mod tests {
     use super::super::testing::{Story, speaking};
     use super::*;
-    use skein_peer::Beliefs;
+    use skein_peer::output::Status;
     use skein_peer::wire::message::Order;
+    use skein_peer::{Beliefs, PeerId};
 
     fn record(kind: Kind, incarnation: u32, seq: u32) -> Record {
         Record {
@@ -446,6 +452,16 @@ mod tests {
         check.on_held(2, &record(Kind::Bid, 2, 1));
         check.on_held(1, &record(Kind::Bid, 2, 1));
         assert!(after(&mut check, 20, 0, |_| {}).is_empty());
+        // Somebody knows of a later life, which said nothing yet, or of none.
+        for (life, owed) in [(2, true), (3, false)] {
+            let mut check = SpreadCheck::default();
+            check.on_held(1, &record(Kind::Bid, 2, 1));
+            let knows = |b: &mut Beliefs| {
+                b.peers.insert(PeerId(9), (life, Status::Down));
+            };
+            let broken = after(&mut check, 90, 0, knows).contains_key("L4");
+            assert_eq!(broken, owed, "{life}");
+        }
     }
 
     #[test]

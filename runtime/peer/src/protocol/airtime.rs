@@ -88,15 +88,12 @@ pub const BURST_PERIODS: u64 = 3;
 /// lost it is missed once in 170,000 times.
 pub const LASTING_INTERVALS: u64 = 10;
 
-/// A peer that has sent fewer than three beacons spends as one of all that were launched, or,
-/// where it does not know how many those are, of so many, itself included: a whole swarm may have
-/// been started at once, and of 255 some 150 are heard in an interval of 16 T in which all begin.
+/// A peer that has sent fewer than three beacons spends as one of all that were launched, and its
+/// interval is long enough for all of them; where it does not know how many those are, it spends as
+/// one of so many, itself included: a whole swarm may have been started at once, and of 255 some
+/// 150 are heard in an interval of 16 T in which all begin.
 const FIRST_SHARERS: u64 = 64;
 const FIRST_BEACONS: u8 = 3;
-
-/// The interval of whoever knows how many were launched is long enough for all of them until it
-/// plans so many beacons.
-const EXPECTING_BEACONS: u8 = 2;
 
 /// A beacon without gossip, in its envelope, at most as long as this but for counters that
 /// ran for hours.
@@ -325,7 +322,7 @@ impl Airtime {
     }
 
     fn expects(&self) -> bool {
-        self.fleet > 0 && self.planned < EXPECTING_BEACONS
+        self.fleet > 0 && self.planned < FIRST_BEACONS
     }
 
     /// An interval that a beacon announces, in milliseconds.
@@ -699,18 +696,17 @@ mod tests {
 
     #[test]
     fn who_knows_how_many_were_launched_counts_on_them_until_it_heard_them() {
-        for (fleet, first, later) in [(20, 8, 4), (100, 39, 4), (255, 64, 4)] {
+        for (fleet, first) in [(20, 8), (100, 39), (255, 64)] {
             let mut air = Airtime::new(64_000, 1000);
             air.expect(fleet);
             air.refill(Time(3_000));
             let bucket = 3_600 / (fleet as i64 + 1) * 3_000;
             assert_eq!(air.tokens_millibytes, bucket, "{fleet}");
             assert_eq!(air.plan_beacon(Time(3_000)).interval, first, "{fleet}");
-            // Nobody else was heard: the interval follows that at once, and what else is said
-            // a beacon later.
-            assert_eq!(air.plan_beacon(Time(19_000)).interval, later, "{fleet}");
+            assert_eq!(air.plan_beacon(Time(19_000)).interval, first, "{fleet}");
             assert_eq!(air.rate_bytes_ps(), 3_600 / (fleet as u64 + 1));
-            assert_eq!(air.plan_beacon(Time(20_000)).interval, later, "{fleet}");
+            // Nobody else was heard: from the third on all follows that.
+            assert_eq!(air.plan_beacon(Time(35_000)).interval, 4, "{fleet}");
             assert_eq!(air.rate_bytes_ps(), 3_600);
         }
     }
