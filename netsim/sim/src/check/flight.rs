@@ -203,6 +203,9 @@ impl FlightCheck {
         let homing = self.homing.entry(m.id).or_insert(fresh);
         if homing.base != base {
             *homing = fresh;
+        } else if m.view.evades {
+            // From where it makes way to it has to come back.
+            homing.due_ms = homing.due_ms.max(fresh.due_ms);
         }
         let homing = *homing;
         if now_ms > homing.due_ms && !self.is_home(m, &homing) && !homing.told {
@@ -277,6 +280,7 @@ mod tests {
     use super::super::testing::{Story, speaking};
     use super::*;
     use crate::world::fixture;
+    use core::cell::Cell;
     use skein_peer::Beliefs;
 
     /// Peer 1 at so many metres from base after each second; what is broken.
@@ -347,6 +351,28 @@ mod tests {
             assert!(flown(change, |_| 600.0).contains_key("home"));
         }
         assert!(flown(|_| {}, |_| 600.0).is_empty());
+    }
+
+    /// It is at home, makes way for an aircraft when it is due there, and comes back.
+    #[test]
+    fn who_makes_way_for_an_aircraft_has_time_to_come_back() {
+        let broken = |evades: bool, back: bool| {
+            let second = Cell::new(0);
+            let change = |b: &mut Beliefs| {
+                second.set(second.get() + 1);
+                b.finished = true;
+                b.evades = evades && (100..110).contains(&second.get());
+            };
+            let away_m = |t: u64| match t {
+                100..120 => 300.0,
+                120.. if !back => 300.0,
+                _ => 0.0,
+            };
+            flown(change, away_m).contains_key("home")
+        };
+        assert!(!broken(true, true));
+        assert!(broken(false, true), "it strays");
+        assert!(broken(true, false), "it does not come back");
     }
 
     #[test]
