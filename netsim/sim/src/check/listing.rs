@@ -208,8 +208,9 @@ impl ListingCheck {
         }
         let is_full = |m: &&PeerSnapshot| newest.get(&m.speaks_as).is_some_and(|n| n.1);
         let able = || snapshot.able().filter(|m| lists(m));
-        able().any(|m| is_full(&m))
-            && able().all(|m| is_full(&m) || m.view.spendable_ms < LITTLE_FUEL_MS)
+        // What it plans takes fuel as well.
+        let spare_ms = |m: &PeerSnapshot| m.view.spendable_ms.saturating_sub(m.eta_ms);
+        able().any(|m| is_full(&m)) && able().all(|m| is_full(&m) || spare_ms(m) < LITTLE_FUEL_MS)
     }
 
     /// The sections of whom the roster names and nobody able has heard of, for as long as
@@ -501,8 +502,9 @@ mod tests {
         alone: Option<u16>,
         /// What everybody but that one believes of others besides.
         others: Vec<(u16, Status)>,
-        /// What each may spend.
+        /// What each may spend, and what its plan takes.
         fuel_ms: u32,
+        eta_ms: u32,
     }
 
     impl Story {
@@ -517,6 +519,7 @@ mod tests {
                 alone: None,
                 others: Vec::new(),
                 fuel_ms: 0,
+                eta_ms: 0,
             }
         }
 
@@ -543,7 +546,7 @@ mod tests {
                     since_ms: 0,
                     at: None,
                     fuel_ms: None,
-                    eta_ms: 0,
+                    eta_ms: self.eta_ms,
                     view: Beliefs {
                         able: true,
                         loop_hash: 9,
@@ -649,9 +652,15 @@ mod tests {
             backward: false,
             stamp: stamp(5, 1),
         };
-        for (runs, fuel_ms, broken) in [(15, 0, true), (16, 0, false), (16, LITTLE_FUEL_MS, true)] {
+        let much = LITTLE_FUEL_MS;
+        for (runs, (fuel_ms, eta_ms), broken) in [
+            (15, (0, 0), true),
+            (16, (0, 0), false),
+            (16, (much, 0), true),
+            (16, (2 * much, much + 1), false),
+        ] {
             let mut s = Story::new(0);
-            s.fuel_ms = fuel_ms;
+            (s.fuel_ms, s.eta_ms) = (fuel_ms, eta_ms);
             let claim = Claim {
                 loop_hash: 9,
                 plan: (0..runs).map(run).collect(),
@@ -662,7 +671,7 @@ mod tests {
                 s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2])]);
             }
             let found = s.found.counts.contains_key("L2");
-            assert_eq!(found, broken, "{runs} runs, {fuel_ms} ms");
+            assert_eq!(found, broken, "{runs} runs, {fuel_ms} ms, {eta_ms} ms");
         }
     }
 
