@@ -9,7 +9,7 @@
 //! | the auction gives a task to fly | its flight is planned beside the loop |
 //! | the flight is planned | it is flown between two cells of the section |
 //! | it is a relay position, or a target to follow | the section is given up at once; the circle is flown, or the target followed, until the task is over |
-//! | the circle is reached | begun: told |
+//! | the circle is reached, a first piece of a line or an area is seen | begun: told |
 //! | the fuel lasts for as long as it takes others to come | others are asked to relieve it; it stays until one has begun |
 //! | all of it is seen | done: told, and the UAV is free for the next |
 //! | the flight is over and not all is seen, there is none | once more, then others are asked to relieve it |
@@ -714,11 +714,18 @@ impl Tasking {
         effects
     }
 
-    /// The camera saw so many pieces of what is flown to.
+    /// The camera saw a piece of what is flown to, and with it the `whole`, or less.
     pub fn sighted(&mut self, now: Time, whole: bool, state: &mut MissionState) -> Effects {
-        let Some(flown) = self.flown.clone().filter(|_| whole) else {
+        let Some(flown) = self.flown.clone() else {
             return Effects::new();
         };
+        if !whole {
+            // Who is in the midst of it is not relieved by who is nearer to its begin.
+            let held = self.auction.held().iter().find(|t| t.task == flown.id);
+            let begins = held.is_some_and(|t| t.progress == Progress::Committed);
+            let events = begins.then(|| self.handle(vec![Event::Begun(flown.id)], state));
+            return events.unwrap_or_default();
+        }
         self.leave(Some(state));
         if let Some(known) = self.known.get_mut(&flown.id) {
             known.done = Some((self.me, now));

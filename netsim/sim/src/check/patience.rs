@@ -62,11 +62,19 @@ impl Joined {
 /// and whoever was launched and is not heard of yet included. Among more, orphans are taken without
 /// one.
 fn are_few(view: &Beliefs, uavs: &BTreeSet<u16>) -> bool {
-    let lives = |(id, (_, s)): (&PeerId, &(Incarnation, Status))| {
-        *s != Status::Down && uavs.contains(&id.0)
+    are_few_with(view, uavs, &BTreeSet::new())
+}
+
+/// The same of a peer that takes some for alive besides.
+fn are_few_with(view: &Beliefs, uavs: &BTreeSet<u16>, besides: &BTreeSet<u16>) -> bool {
+    let lives = |id: &u16| {
+        let believed = view.peers.get(&PeerId(*id));
+        besides.contains(id) || believed.is_some_and(|(_, s)| *s != Status::Down)
     };
-    let others = view.peers.iter().filter(|p| lives(*p)).count();
-    1 + others + view.unheard <= MEMBERS_MAX
+    let known = view.peers.keys().map(|id| id.0);
+    let all: BTreeSet<u16> = known.chain(besides.iter().copied()).collect();
+    let others = all.iter().filter(|id| uavs.contains(id) && lives(id));
+    1 + others.count() + view.unheard <= MEMBERS_MAX
 }
 
 /// One peer's part.
@@ -234,7 +242,10 @@ impl PatienceCheck {
             .is_some_and(|t| handicaps.lived_ms(observer, t, now_ms) > settled_ms);
         let believed = view.peers.get(&PeerId(subject));
         let was_alive = believed.is_some_and(|(i, s)| *i == incarnation && *s != Status::Down);
-        let few = are_few(view, &self.uavs);
+        // Halves that have met since the last snapshot may be many.
+        let since = self.lives.range((observer, 0)..=(observer, u16::MAX));
+        let since = since.map(|((_, other), _)| *other).collect();
+        let few = are_few_with(view, &self.uavs, &since);
         if !view.able || !settled || !part.decided || !was_alive || !few {
             return;
         }
@@ -645,6 +656,31 @@ mod tests {
                 true,
             ),
             (4, false, 2, |check| check.on_silent(1), false),
+            // Too many were met since the last snapshot.
+            (
+                4,
+                false,
+                2,
+                |check| {
+                    for id in 3..=10 {
+                        check.uavs.insert(id);
+                        check.on_believed(29_900, (1, id), 1);
+                    }
+                },
+                false,
+            ),
+            (
+                4,
+                false,
+                2,
+                |check| {
+                    for id in 3..=9 {
+                        check.uavs.insert(id);
+                        check.on_believed(29_900, (1, id), 1);
+                    }
+                },
+                true,
+            ),
             // Another one, in a life that began since the last snapshot, lists them.
             (
                 4,

@@ -9,7 +9,7 @@ use crate::testing::{GROUND_STATION, Harness, mission};
 use crate::why::Reason;
 use crate::wire::codec::Body;
 use crate::wire::kinds::Kind;
-use crate::wire::tasks::{TaskKind, TaskState};
+use crate::wire::tasks::{Progress, TaskKind, TaskState};
 
 fn view(h: &Harness, at: u16, name: &str) -> Option<TaskView> {
     let tasks = h.why(at).tasks;
@@ -191,6 +191,44 @@ fn a_line_is_flown_along_and_many_tasks_are_shared() {
     for name in &names {
         assert_eq!(doers(&mut h, 3, name).len(), 1, "{name}");
     }
+}
+
+/// Tasks change while it is far along a line: another one is nearer to where that begins.
+#[test]
+fn who_is_in_the_midst_of_a_line_flies_it_to_its_end() {
+    let mut h = with_operator(2, mission(1, 6, 4));
+    assert!(h.run_until(400, |h| all_finished(h, [1, 2])));
+    add(
+        &mut h,
+        NewTask {
+            kind: TaskKind::Line,
+            places: vec![(20_000, 440_000), (2_500_000, 440_000)],
+            radius_mm: 2_000,
+            ..point("road", 0.0, 0.0)
+        },
+    );
+    let begun = |h: &Harness| {
+        let held = view(h, GROUND_STATION, "road").map(|road| road.held_by);
+        let mut held = held.into_iter().flatten();
+        held.find(|t| t.progress == Progress::Begun).map(|t| t.uav)
+    };
+    assert!(h.run_until(300, |h| begun(h).is_some()));
+    let first = begun(&h).unwrap();
+    h.run_s(80);
+    assert_eq!(begun(&h), Some(first));
+    let at = h.pose(first).position();
+    add(
+        &mut h,
+        NewTask {
+            worth: 1,
+            ..point("by-the-way", at.x, at.y)
+        },
+    );
+    assert!(h.run_until(500, |h| state(h, GROUND_STATION, "road")
+        == Some(TaskState::Done)));
+    assert_eq!(doers(&mut h, 2, "road"), [first]);
+    let left = |(_, r): &(u64, Report)| matches!(r, Report::Task { name, news: TaskNews::Left, .. } if name == "road");
+    assert!(!h.seat(first).reports.iter().any(left));
 }
 
 #[test]
