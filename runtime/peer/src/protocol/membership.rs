@@ -15,7 +15,7 @@
 //! | alive | half of that, and the transport says that the link is gone | suspect |
 //! | alive | a suspicion against this very heartbeat is heard | suspect |
 //! | any | a fresher heartbeat from anybody, younger than the bound | alive; suspect if a suspicion against it is told with it |
-//! | suspect | k2 T' + k1 (T' - I) unrefuted | down |
+//! | suspect | k2 T' + k1 (T' - I) unrefuted, and (D - 1) T' more where T' is longer than T | down |
 //! | alive, suspect | heartbeat older than (k1 + k2 + D + 2) T' | down |
 //! | any | a heartbeat of a later life, younger than the bound | likewise, in that life |
 //! | any | a heartbeat of a later life, older than the bound | down, in that life |
@@ -254,7 +254,8 @@ impl Membership {
 
     fn patience(&self, now: Time) -> Patience {
         let diameter = u64::from(self.diameter(now));
-        Patience::new(self.interval_ms(), diameter, now < self.doubt_until)
+        let doubts = now < self.doubt_until;
+        Patience::new(self.interval_ms(), self.period_ms, diameter, doubts)
     }
 
     /// Silence after which a peer is suspected, milliseconds: k1 T'.

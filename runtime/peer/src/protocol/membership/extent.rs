@@ -88,24 +88,27 @@ pub(super) struct Patience {
     pub(super) interval_ms: u64,
     /// k1, quarters.
     k1_quarters: u64,
-    /// Time to refute a suspicion: k2 T'.
-    k2_ms: u64,
+    /// Time to refute a suspicion: k2 T', and (D - 1) T' more where the air is full.
+    refute_ms: u64,
     /// No living peer's heartbeat is older: (k1 + k2 + D + 2) T'.
     pub(super) bound_ms: u64,
 }
 
 impl Patience {
     /// Where the longest interval is T' and the diameter D. A peer whose own loop ran late
-    /// doubts its verdicts first: both factors double.
-    pub(super) fn new(interval_ms: u64, diameter: u64, doubts: bool) -> Self {
+    /// doubts its verdicts first: both factors double. Where T' is longer than a period T, so many
+    /// share the air that what refutes a suspicion is often lost between two hops.
+    pub(super) fn new(interval_ms: u64, period_ms: u64, diameter: u64, doubts: bool) -> Self {
         let doubt = if doubts { 2 } else { 1 };
         let k1_quarters = doubt * (16 + diameter);
         let k2_ms = doubt * interval_ms * (8 + diameter) / 2;
         let travel_ms = (diameter + 2) * interval_ms;
+        let is_full = interval_ms > period_ms;
+        let detours_ms = u64::from(is_full) * diameter.saturating_sub(1) * interval_ms;
         Self {
             interval_ms,
             k1_quarters,
-            k2_ms,
+            refute_ms: k2_ms + detours_ms,
             bound_ms: interval_ms * k1_quarters / 4 + k2_ms + travel_ms,
         }
     }
@@ -115,11 +118,11 @@ impl Patience {
         interval_ms * self.k1_quarters / 4
     }
 
-    /// Time to refute a suspicion of who announced such an interval: k2 T', and as much more
-    /// as it is suspected sooner than the slowest would be. Where many are on the way what a
+    /// Time to refute a suspicion of who announced such an interval: k2 T' or more, and as much
+    /// more as it is suspected sooner than the slowest would be. Where many are on the way what a
     /// heartbeat takes is counted in the longest interval, whoever sent it.
     pub(super) fn verdict_ms(&self, interval_ms: u64) -> u64 {
         let sooner_ms = self.interval_ms.saturating_sub(interval_ms);
-        self.k2_ms + self.k1_ms(sooner_ms)
+        self.refute_ms + self.k1_ms(sooner_ms)
     }
 }

@@ -994,6 +994,16 @@ fn the_diameter_is_the_largest_eccentricity_heard_of_in_ten_intervals() {
     assert_eq!(patience.k1_ms(1_000), 5_500);
     assert_eq!(patience.bound_ms, 5_500 + 7_000 + 8_000);
     assert_eq!(patience.verdict_ms(1_000), 7_000);
+    // Where the air is full, what is on the way has four hops more to be lost on.
+    let full = Patience::new(2_000, 1_000, 5, false);
+    assert_eq!(full.verdict_ms(2_000), 2_000 * 13 / 2 + 4 * 2_000);
+    assert_eq!(
+        full.bound_ms,
+        2_000 * 21 / 4 + 2_000 * 13 / 2 + 2_000 * (5 + 2)
+    );
+    assert!(full.k1_ms(2_000) + full.verdict_ms(2_000) < full.bound_ms);
+    let near = Patience::new(2_000, 1_000, 1, false);
+    assert_eq!(near.verdict_ms(2_000), 9_000);
 }
 
 #[test]
