@@ -174,7 +174,7 @@ impl ListingCheck {
             }
         }
         let counts_from_ms = stable_ms.max(able_since_ms);
-        let expected = self.expected(snapshot, able_since_ms);
+        let expected = self.expected(snapshot, able_since_ms, lists);
         self.note_claims_of_the_dead(snapshot, members, lists);
         let heeded = self.claimed_by_who_left(snapshot, lists);
         let is_full = OnceCell::new();
@@ -213,13 +213,18 @@ impl ListingCheck {
         able().any(|m| is_full(&m)) && able().all(|m| is_full(&m) || spare_ms(m) < LITTLE_FUEL_MS)
     }
 
-    /// The sections of whom the roster names and nobody able has heard of, for as long as
-    /// each would take.
-    fn expected(&self, snapshot: &Snapshot<'_>, begin_ms: u64) -> CellSet {
+    /// The sections of whom the roster names and nobody able who lists for others has heard of, for
+    /// as long as each would take.
+    fn expected(
+        &self,
+        snapshot: &Snapshot<'_>,
+        begin_ms: u64,
+        lists: impl Fn(&PeerSnapshot) -> bool,
+    ) -> CellSet {
         let mut expected = CellSet::new(snapshot.covered.capacity());
         for p in &self.roster {
             let end_ms = begin_ms + snapshot.grown_ms(p.end_ms, begin_ms);
-            let mut able = snapshot.able();
+            let mut able = snapshot.able().filter(|m| lists(m));
             let id = PeerId(p.id);
             if snapshot.now_ms < end_ms
                 && !able.any(|m| m.speaks_as == p.id || m.view.peers.contains_key(&id))
@@ -643,6 +648,17 @@ mod tests {
             s.found.counts.contains_key("L2"),
             "somebody has heard of it"
         );
+        // It flies it, out of reach of all others from the beginning.
+        for (heard, broken) in [(false, false), (true, true)] {
+            let mut s = Story::new(0);
+            s.alone = Some(3);
+            s.others = if heard { vec![(3, Status::Alive)] } else { vec![] };
+            s.check = ListingCheck::with_roster(roster(90_000));
+            for t in 0..30 {
+                s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2]), (3, &[3])]);
+            }
+            assert_eq!(s.found.counts.contains_key("L2"), broken, "{heard}");
+        }
     }
 
     #[test]
