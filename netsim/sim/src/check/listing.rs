@@ -652,7 +652,11 @@ mod tests {
         for (heard, broken) in [(false, false), (true, true)] {
             let mut s = Story::new(0);
             s.alone = Some(3);
-            s.others = if heard { vec![(3, Status::Alive)] } else { vec![] };
+            s.others = if heard {
+                vec![(3, Status::Alive)]
+            } else {
+                vec![]
+            };
             s.check = ListingCheck::with_roster(roster(90_000));
             for t in 0..30 {
                 s.snapshot(t * 1000, &[(1, &[0, 1]), (2, &[2]), (3, &[3])]);

@@ -626,7 +626,10 @@ impl Membership {
             // clock that jumped.
             heard.age = known.freshest.age;
         } else {
-            known.excused_ms = waited_ms;
+            // Nor was it silent for longer: what was no silence since the earlier one is none now.
+            let listened_ms = known.silent_ms(now);
+            let unheard_ms = heard.age.ms(now).saturating_sub(listened_ms);
+            known.excused_ms = waited_ms.max(unheard_ms);
         }
         let new_life = heard.incarnation > known.freshest.incarnation;
         if new_life {

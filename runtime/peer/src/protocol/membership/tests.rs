@@ -1268,6 +1268,28 @@ fn who_was_late_raises_no_suspicion_for_a_period() {
     assert_eq!(suspected.0, 8_000);
 }
 
+/// The clocks of two jump one after the other: what the one tells of a third after that is too old,
+/// and the other, which doubts its verdicts for a period, took that for silence once it was over.
+#[test]
+fn a_later_heartbeat_told_too_old_is_no_silence_either() {
+    let mut m = Membership::new(1, 1000);
+    m.on_beacon(Time(0), 2, 1, &beacon(1, Vec::new()));
+    m.on_beacon(Time(900), 3, 1, &beacon(1, Vec::new()));
+    m.tick(Time(1_000));
+    m.was_late(Time(22_000), 20_750, 21_000);
+    // Beyond the bound, and less than it is while this peer doubts.
+    let told = entry(3, 2, 180, None);
+    m.on_beacon(Time(22_600), 2, 1, &beacon(9, vec![told]));
+    assert!((91..120).all(|t| m.tick(Time(t * 250)).iter().all(|c| c.peer != 3)));
+    assert_eq!(m.status(3), Some((1, Status::Alive)));
+    // It ran all the time, and 3 is silent: that is found out.
+    let gave_up = (120..200).find(|t| {
+        m.tick(Time(t * 250));
+        m.status(3) == Some((1, Status::Down))
+    });
+    assert!(gave_up.is_some());
+}
+
 /// What waited while a peer stood still may be as old as that: it tells so, and nobody else
 /// takes it for fresh; for its own verdicts it is no silence.
 #[test]
