@@ -621,6 +621,14 @@ mod tests {
         view.expect("a snapshot was judged").unheard = unheard;
     }
 
+    /// Peer 1 takes so many others for alive since the last snapshot.
+    fn meets(check: &mut PatienceCheck, others: u16) {
+        for id in 3..3 + others {
+            check.uavs.insert(id);
+            check.on_believed(29_900, (1, id), 1);
+        }
+    }
+
     #[test]
     fn a_loss_that_opens_no_round_at_once_is_found() {
         let claim = |count| {
@@ -657,30 +665,8 @@ mod tests {
             ),
             (4, false, 2, |check| check.on_silent(1), false),
             // Too many were met since the last snapshot.
-            (
-                4,
-                false,
-                2,
-                |check| {
-                    for id in 3..=10 {
-                        check.uavs.insert(id);
-                        check.on_believed(29_900, (1, id), 1);
-                    }
-                },
-                false,
-            ),
-            (
-                4,
-                false,
-                2,
-                |check| {
-                    for id in 3..=9 {
-                        check.uavs.insert(id);
-                        check.on_believed(29_900, (1, id), 1);
-                    }
-                },
-                true,
-            ),
+            (4, false, 2, |check| meets(check, 8), false),
+            (4, false, 2, |check| meets(check, 7), true),
             // Another one, in a life that began since the last snapshot, lists them.
             (
                 4,
