@@ -6,6 +6,7 @@ use crate::twins::Twins;
 use skein_peer::Incarnation;
 use skein_peer::cells::CellSet;
 use skein_peer::wire::kinds::Kind;
+use skein_peer::wire::limits::MEMBERS_MAX;
 use skein_peer::wire::message::Record;
 use std::collections::BTreeMap;
 
@@ -226,9 +227,14 @@ impl SpreadCheck {
         found: &mut Findings,
     ) {
         let newest = self.newest(peers);
+        // Among more no round is opened: nobody waits for a bid of one that was.
+        let few = peers.iter().filter(|m| m.uav).count() <= MEMBERS_MAX;
+        let is_owed = |kind: u8| few || kind != Kind::Bid.number();
         for m in peers {
             let row = self.held.get(&m.id).map_or(&[][..], |row| &row[..]);
-            let others = newest.iter().filter(|(key, ..)| key.0 != m.speaks_as);
+            let others = newest
+                .iter()
+                .filter(|(key, ..)| key.0 != m.speaks_as && is_owed(key.1));
             for (key, place, wanted) in others {
                 let held = row.get(*place).copied().unwrap_or_default();
                 if held >= *wanted {
@@ -423,6 +429,30 @@ mod tests {
             assert!(after(&mut check.clone(), 57, loss, |_| {}).is_empty());
             let counts = after(&mut check, 58, loss, |_| {});
             assert_eq!(counts.contains_key("L4"), broken, "{kind:?} {has:?} {loss}");
+        }
+    }
+
+    /// Bids are for rounds, and these for few.
+    #[test]
+    fn a_bid_is_owed_among_few() {
+        for (uavs, kind, broken) in [
+            (8, Kind::Bid, true),
+            (9, Kind::Bid, false),
+            (9, Kind::Claim, true),
+        ] {
+            let (mut story, mut found) = (Story::new(0), Findings::new(1));
+            let mut check = SpreadCheck::default();
+            let said = Record {
+                author: 20,
+                ..record(kind, 1, 5)
+            };
+            (1..uavs).for_each(|id| check.on_held(id, &said));
+            let views: Vec<_> = (1..=uavs).map(|id| (id, speaking())).collect();
+            for t in 0..120 {
+                story.snapshot(t * 1000, &views, |s| check.on_snapshot(s, &mut found));
+            }
+            let is_broken = found.counts.contains_key("L4");
+            assert_eq!(is_broken, broken, "{kind:?} among {uavs}");
         }
     }
 
