@@ -15,7 +15,7 @@
 //! | alive | half of that, and the transport says that the link is gone | suspect |
 //! | alive | a suspicion against this very heartbeat is heard | suspect |
 //! | any | a fresher heartbeat from anybody, younger than the bound | alive; suspect if a suspicion against it is told with it |
-//! | suspect | k2 T' + k1 (T' - I) unrefuted, and (D - 1) T' more where T' is longer than T | down |
+//! | suspect | k2 T' + (D - 1) T'/2 + k1 (T' - I) unrefuted, (D - 1) T' where T' is longer than T | down |
 //! | alive, suspect | heartbeat older than (k1 + k2 + D + 2) T' | down |
 //! | any | a heartbeat of a later life, younger than the bound | likewise, in that life |
 //! | any | a heartbeat of a later life, older than the bound | down, in that life |

@@ -88,7 +88,7 @@ pub(super) struct Patience {
     pub(super) interval_ms: u64,
     /// k1, quarters.
     k1_quarters: u64,
-    /// Time to refute a suspicion: k2 T', and (D - 1) T' more where the air is full.
+    /// Time to refute a suspicion: k2 T' + (D - 1) T'/2, twice the latter where the air is full.
     refute_ms: u64,
     /// No living peer's heartbeat is older: (k1 + k2 + D + 2) T'.
     pub(super) bound_ms: u64,
@@ -96,15 +96,15 @@ pub(super) struct Patience {
 
 impl Patience {
     /// Where the longest interval is T' and the diameter D. A peer whose own loop ran late
-    /// doubts its verdicts first: both factors double. Where T' is longer than a period T, so many
-    /// share the air that what refutes a suspicion is often lost between two hops.
+    /// doubts its verdicts first: both factors double. What refutes a suspicion may be lost between
+    /// two hops, and often is where T' is longer than a period T, so many share the air.
     pub(super) fn new(interval_ms: u64, period_ms: u64, diameter: u64, doubts: bool) -> Self {
         let doubt = if doubts { 2 } else { 1 };
         let k1_quarters = doubt * (16 + diameter);
         let k2_ms = doubt * interval_ms * (8 + diameter) / 2;
         let travel_ms = (diameter + 2) * interval_ms;
-        let is_full = interval_ms > period_ms;
-        let detours_ms = u64::from(is_full) * diameter.saturating_sub(1) * interval_ms;
+        let halves = if interval_ms > period_ms { 2 } else { 1 };
+        let detours_ms = halves * diameter.saturating_sub(1) * interval_ms / 2;
         Self {
             interval_ms,
             k1_quarters,

@@ -358,11 +358,11 @@ fn a_suspicion_is_taken_over_and_refuted() {
         .flat_map(|i| m.tick(Time(i * 250)).into_iter().map(move |c| (i * 250, c)))
         .filter(|(_, c)| c.peer == 2 && c.status == Status::Down)
         .collect();
-    // D is 2 here: told at 3.5 s, and k2 is 5 periods.
+    // D is 2 here: told at 3.5 s, k2 is 5 periods, and half of one is for the second hop.
     assert_eq!(
         down,
         [(
-            8500,
+            9000,
             Change {
                 peer: 2,
                 incarnation: 1,
@@ -993,7 +993,7 @@ fn the_diameter_is_the_largest_eccentricity_heard_of_in_ten_intervals() {
     let patience = m.patience(Time(22_000));
     assert_eq!(patience.k1_ms(1_000), 5_500);
     assert_eq!(patience.bound_ms, 5_500 + 7_000 + 8_000);
-    assert_eq!(patience.verdict_ms(1_000), 7_000);
+    assert_eq!(patience.verdict_ms(1_000), 7_000 + 5 * 500);
     // Where the air is full, what is on the way has four hops more to be lost on.
     let full = Patience::new(2_000, 1_000, 5, false);
     assert_eq!(full.verdict_ms(2_000), 2_000 * 13 / 2 + 4 * 2_000);

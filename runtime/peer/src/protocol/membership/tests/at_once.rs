@@ -50,7 +50,7 @@ fn a_suspicion_is_asked_about_at_once_from_a_third_of_its_time_on() {
     let mut m = among_many_far_apart();
     let now = Time(3_000);
     let verdict_ms = m.patience(now).verdict_ms(1_000);
-    assert_eq!(verdict_ms, 5_000);
+    assert_eq!(verdict_ms, 5_500);
     m.on_others(now, 3, &asked(5, Some(10)));
     assert_eq!(m.status(30), Some((1, Status::Suspect)));
     assert!(!m.take_question(), "gossip has time");
@@ -66,7 +66,7 @@ fn a_suspicion_is_asked_about_at_once_from_a_third_of_its_time_on() {
             asked_at.push(t * 250 + 1_000);
         }
     }
-    assert_eq!(asked_at, [1_750, 2_500, 3_500, 4_250]);
+    assert_eq!(asked_at, [2_000, 2_750, 3_750, 4_750]);
     assert_eq!(m.status(30), Some((1, Status::Down)));
 }
 
