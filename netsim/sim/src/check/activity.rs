@@ -87,6 +87,8 @@ pub struct ActivityCheck {
     /// The sortie in which a process knew of what ends it. Of what was told twice one is
     /// withdrawn, and who hears of that first has ended rightly all the same.
     found: BTreeMap<u16, u16>,
+    /// Who was told of an object since it was looked at last.
+    heard: BTreeSet<u16>,
     /// The goals to which the events of now lead, where they lead to one.
     wanted: BTreeMap<u16, StateGoal>,
     wrong: Clocks<u16>,
@@ -122,6 +124,7 @@ impl ActivityCheck {
     /// snapshot, and have ended that mission meanwhile.
     pub fn on_detected(&mut self, id: u16, told: &Detection) {
         if told.stands == Stands::Told {
+            self.heard.insert(id);
             let known = self.found.entry(id).or_insert(told.sortie);
             *known = told.sortie.max(*known);
         }
@@ -136,6 +139,7 @@ impl ActivityCheck {
             self.began.remove(&id);
             self.early.remove(&id);
             self.found.remove(&id);
+            self.heard.remove(&id);
         }
     }
 
@@ -178,6 +182,7 @@ impl ActivityCheck {
         for m in uavs() {
             self.look_at(snapshot, m, found);
         }
+        self.heard.clear();
     }
 
     /// What is known of a UAV whose mission is known.
@@ -267,8 +272,10 @@ impl ActivityCheck {
         let told: BTreeSet<TaskId> = facts.told().collect();
         // What was found is withdrawn, and a moment later found by another: in between it is not.
         let is_replaced = last.is_some_and(|l| l.told.is_disjoint(&told) && !told.is_empty());
+        // Or it is found and withdrawn between two looks.
+        let is_passing_by = is_replaced || self.heard.contains(&id);
         let passing = |key: (MissionEvent, u32), now: Holds| {
-            if self.is_passing(key.0) || key.0 == MissionEvent::ObjectDetected && is_replaced {
+            if self.is_passing(key.0) || key.0 == MissionEvent::ObjectDetected && is_passing_by {
                 Holds::Maybe
             } else {
                 either(key, now)
@@ -835,6 +842,34 @@ mod tests {
             ..told(ends.sortie)
         };
         assert!(broken(&ends, Some(withdrawn)));
+    }
+
+    #[test]
+    fn what_was_found_and_withdrawn_between_two_looks_leads_on() {
+        let mission = with_state("found", Some(Part::Ends), (MissionEvent::ObjectDetected, 0));
+        let machine = mission.machine().unwrap();
+        let at = |name| machine.states().iter().position(|s| s.name == name);
+        let broken = |told_before: Option<usize>| {
+            let (mut story, mut findings) = (Story::new(0), Findings::new(1));
+            let mut check = ActivityCheck::default();
+            check.on_mission(&mission);
+            for (t, name) in ["wait", "wait", "found"].into_iter().enumerate() {
+                if told_before == Some(t) {
+                    check.on_detected(1, &Detection::default());
+                }
+                let view = Beliefs {
+                    stage: at(name).map(|at| (at, MissionEvent::Otherwise)),
+                    ..speaking()
+                };
+                story.snapshot(t as u64 * 1000, &[(1, view)], |s| {
+                    check.on_snapshot(s, &mut findings)
+                });
+            }
+            findings.counts.contains_key("activity")
+        };
+        assert!(!broken(Some(2)));
+        assert!(broken(None));
+        assert!(broken(Some(1)), "it was looked at since");
     }
 
     /// It came from a task when what was found was withdrawn, and waits; then another tells the
