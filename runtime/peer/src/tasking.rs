@@ -716,22 +716,22 @@ impl Tasking {
 
     /// The camera saw a piece of what is flown to, and with it the `whole`, or less.
     pub fn sighted(&mut self, now: Time, whole: bool, state: &mut MissionState) -> Effects {
-        let Some(flown) = self.flown.clone() else {
+        let Some(id) = self.flown() else {
             return Effects::new();
         };
         if !whole {
             // Who is in the midst of it is not relieved by who is nearer to its begin.
-            let held = self.auction.held().iter().find(|t| t.task == flown.id);
+            let held = self.auction.held().iter().find(|t| t.task == id);
             let begins = held.is_some_and(|t| t.progress == Progress::Committed);
-            let events = begins.then(|| self.handle(vec![Event::Begun(flown.id)], state));
+            let events = begins.then(|| self.handle(vec![Event::Begun(id)], state));
             return events.unwrap_or_default();
         }
         self.leave(Some(state));
-        if let Some(known) = self.known.get_mut(&flown.id) {
+        if let Some(known) = self.known.get_mut(&id) {
             known.done = Some((self.me, now));
         }
-        let mut effects: Effects = self.told(flown.id, TaskNews::Seen).into_iter().collect();
-        effects.extend(self.handle(vec![Event::Finished(flown.id)], state));
+        let mut effects: Effects = self.told(id, TaskNews::Seen).into_iter().collect();
+        effects.extend(self.handle(vec![Event::Finished(id)], state));
         effects.push(Effect::Negotiate);
         effects
     }

@@ -206,7 +206,9 @@ impl SpreadCheck {
         for m in peers {
             let life = lives.entry(m.speaks_as).or_default();
             *life = (*life).max(m.view.incarnation);
-            for (known, (incarnation, _)) in &m.view.peers {
+            // No record is of a life before the first.
+            let later = m.view.peers.iter().filter(|(_, (life, _))| *life > 1);
+            for (known, (incarnation, _)) in later {
                 let life = lives.entry(known.0).or_default();
                 *life = (*life).max(*incarnation);
             }

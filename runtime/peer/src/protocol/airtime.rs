@@ -265,7 +265,7 @@ impl Airtime {
     }
 
     fn rate_bytes_ps(&self) -> u64 {
-        let least = match (self.planned < FIRST_BEACONS, self.fleet) {
+        let least = match (self.is_new(), self.fleet) {
             (false, _) => 1,
             (true, 0) => FIRST_SHARERS,
             (true, fleet) => fleet,
@@ -321,8 +321,12 @@ impl Airtime {
         wait_ms.saturating_sub(passed_ms).max(1)
     }
 
+    fn is_new(&self) -> bool {
+        self.planned < FIRST_BEACONS
+    }
+
     fn expects(&self) -> bool {
-        self.fleet > 0 && self.planned < FIRST_BEACONS
+        self.fleet > 0 && self.is_new()
     }
 
     /// An interval that a beacon announces, in milliseconds.
@@ -344,8 +348,8 @@ impl Airtime {
     }
 
     /// A beacon with gossip is due. The interval at most doubles from one to the next: who
-    /// misses the one that announces it is not to be alarmed by the silence. The first is no
-    /// next one: it is long enough for all that are expected.
+    /// misses the one that announces it is not to be alarmed by the silence. The first two
+    /// are no next ones: they are long enough for all that are expected.
     pub fn plan_beacon(&mut self, now: Time) -> BeaconPlan {
         self.forget(now);
         self.refill(now);

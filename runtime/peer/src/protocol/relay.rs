@@ -190,6 +190,11 @@ fn is_piece(key: &RecordKey) -> bool {
     key.1 == Kind::Mission.number()
 }
 
+/// Whether a record is an order that this peer has not passed on yet: everybody does, once.
+fn is_for_all(key: &RecordKey, held: &Held) -> bool {
+    key.1 == Kind::Operator.number() && held.said == 0
+}
+
 /// All keys of one author.
 fn keys_of(author: u16) -> core::ops::RangeInclusive<RecordKey> {
     (author, 0, 0, 0)..=(author, u8::MAX, u16::MAX, u32::MAX)
@@ -359,8 +364,7 @@ impl Relay {
                 h.sent = now;
                 // A copy by a shorter way: what is passed on has made fewer hops.
                 h.hops = h.hops.min(hops.saturating_add(1));
-                let is_enough = h.copies >= COPIES_HEARD;
-                if is_enough && !(kind == Kind::Operator && h.said == 0) {
+                if h.copies >= COPIES_HEARD && !is_for_all(&key, h) {
                     self.queue.remove(&key);
                 }
                 return Offer::Duplicate;
@@ -495,10 +499,9 @@ impl Relay {
     fn standing(&self, key: &RecordKey, priority: Priority) -> Standing {
         let unsaid = || self.held.get(key).is_some_and(|h| h.copies == 0);
         let is_end = key.1 == Kind::Finished.number();
-        let is_order = key.1 == Kind::Operator.number();
-        let passes_on = || self.held.get(key).is_some_and(|h| h.said == 0);
+        let passes_on = || self.held.get(key).is_some_and(|h| is_for_all(key, h));
         match priority {
-            _ if key.0 != self.me && is_order && passes_on() => Standing::First,
+            _ if key.0 != self.me && passes_on() => Standing::First,
             _ if key.0 != self.me => Standing::Due,
             Priority::Conflict | Priority::Claim if unsaid() => Standing::First,
             Priority::Telemetry if is_end && unsaid() => Standing::First,
